@@ -1,0 +1,367 @@
+"""Hybrid automata: flow set, flow map, jump set and jump map over declared variables."""
+
+from __future__ import annotations
+
+import enum
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from hybrid_model.errors import DeclarationError
+from hybrid_model.variables import Declaration, Dimension, Kind, Value, Values, Variable
+
+Assignments = Mapping[str, Value]
+"""Variable name -> value: what flow, jump, start and output maps return."""
+
+
+class Priority(enum.Enum):
+    """What happens where flow set and jump set overlap."""
+
+    JUMP = "a state in the jump set jumps"
+    FLOW = "a state in the flow set flows on; it jumps when it cannot flow"
+
+
+class Trigger(enum.Enum):
+    """What makes a jump happen."""
+
+    STATE = "its margin is zero or above"
+    TIME = "its time has come"
+
+
+@dataclass(frozen=True)
+class JumpInfo:
+    """A jump of an automaton as executions see it.
+
+    Attributes
+    ----------
+    name : str
+        Unique in the automaton; in a composition scoped by dots.
+    trigger : Trigger
+        State margin or known time.
+    internal : bool
+        A breakpoint of the flow: it depends on time, parameters and discrete states only, and nobody outside sees it.
+    """
+
+    name: str
+    trigger: Trigger
+    internal: bool = False
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A jump on a state margin, for automata with several: jump set (margin) and jump map by name.
+
+    Attributes
+    ----------
+    name : str
+        Name of the jump.
+    jump_set : callable
+        ``jump_set(self, s) -> margin``; the jump is enabled where the margin is zero or above.
+    jump_map : callable
+        ``jump_map(self, s) -> {state: new value}``; states not named are kept.
+    """
+
+    name: str
+    jump_set: Callable[[Any, Values], Value]
+    jump_map: Callable[[Any, Values], Assignments]
+
+
+@dataclass(frozen=True)
+class TimeEvent:
+    """A jump at a known time.
+
+    Attributes
+    ----------
+    name : str
+        Name of the jump.
+    time : callable
+        ``time(self, s) -> absolute time`` in s of the next one, from parameters and discrete states; infinity for
+        never. The jump map must move it on.
+    jump_map : callable
+        As in `Jump`.
+    internal : bool
+        Whether it is only a breakpoint of the flow (a weight that switches): runs stop at it and go on, and it is not
+        an event for anybody outside.
+    """
+
+    name: str
+    time: Callable[[Any, Values], Value]
+    jump_map: Callable[[Any, Values], Assignments]
+    internal: bool = False
+
+
+class Clock:
+    """An output that ticks with a jump, and holds no value.
+
+    Parameters
+    ----------
+    jump : str
+        Name of the jump that it ticks with.
+    description : str
+        For people and for the FMU's description.
+    """
+
+    def __init__(self, jump: str, description: str = "") -> None:
+        self.jump = jump
+        self.description = description
+
+
+@dataclass(frozen=True)
+class ClockInfo:
+    """A clock of an automaton as executions see it: ticks with jump number `jump`."""
+
+    name: str
+    jump: int
+    description: str = ""
+
+
+class Automaton(ABC):
+    """What every execution of an automaton uses; `HybridAutomaton` and `Composition` implement it.
+
+    Each map takes the values of all variables at one instant and must work on floats, arrays and symbols alike.
+
+    Attributes
+    ----------
+    name : str
+        Name of the automaton, for messages and as the name of an FMU.
+    variables : tuple of Variable
+        In declaration order.
+    jumps : tuple of JumpInfo
+        In the fixed order in which simultaneous jumps are taken.
+    clocks : tuple of ClockInfo
+        Outputs that tick.
+    priority : Priority
+        What happens where flow set and jump set overlap.
+    """
+
+    name: str
+    variables: tuple[Variable, ...]
+    jumps: tuple[JumpInfo, ...]
+    clocks: tuple[ClockInfo, ...]
+    priority: Priority
+
+    @property
+    @abstractmethod
+    def has_flow_set(self) -> bool:
+        """Whether flow is restricted at all."""
+
+    @abstractmethod
+    def start_values(self, s: Values) -> Assignments:
+        """Return the start values of the computed states."""
+
+    @abstractmethod
+    def derivatives(self, s: Values) -> Assignments:
+        """Return the time derivative of every continuous state."""
+
+    @abstractmethod
+    def flow_margin(self, s: Values) -> Value:
+        """Return the flow set's margin (scalar, >= 0 inside)."""
+
+    @abstractmethod
+    def jump_margins(self, s: Values) -> list[Value]:
+        """Return the margins of the jumps on state, in the order of `jumps` (scalars, >= 0 enabled)."""
+
+    @abstractmethod
+    def event_times(self, s: Values) -> list[Value]:
+        """Return the absolute times in s of the jumps on time, in the order of `jumps`."""
+
+    @abstractmethod
+    def reset(self, jump: int, s: Values) -> Assignments:
+        """Return the new values that jump number `jump` gives to states."""
+
+    @abstractmethod
+    def output_values(self, s: Values) -> Assignments:
+        """Return the values of the computed outputs."""
+
+    def of_kind(self, *kinds: Kind) -> list[Variable]:
+        """Return the variables of the given kinds, in declaration order."""
+        return [v for v in self.variables if v.kind in kinds]
+
+
+class HybridAutomaton(Automaton):
+    """Base class of automata written by hand: declare variables as class attributes and write the maps.
+
+    Subclasses write ``flow_map`` and, as needed, ``flow_set``, ``jump_set`` with ``jump_map`` (one jump, named
+    ``"jump"``) or a tuple ``transitions`` of `Jump` and `TimeEvent`, ``start_map`` and ``outputs``.
+    Sets are margins: continuous functions that are zero or above inside.
+
+    Parameters
+    ----------
+    name : str, optional
+        Name of the instance; default: the class's.
+    **values : float or array_like or int
+        Start values, parameter values, and lengths of dimensions, by name.
+
+    Raises
+    ------
+    DeclarationError
+        For an unknown name, a wrong shape, or a value that is not finite.
+    """
+
+    priority = Priority.JUMP
+    transitions: ClassVar[tuple[Jump | TimeEvent, ...]] = ()
+
+    def __init__(self, name: str | None = None, **values: Any) -> None:
+        self.name = name or type(self).__name__
+        declarations = _declared(type(self), Declaration)
+        dimensions = _declared(type(self), Dimension)
+        for given in values:
+            if given not in declarations and given not in dimensions:
+                raise DeclarationError(
+                    f"{self.name} has nothing named {given!r} to set; it has {', '.join([*declarations, *dimensions])}."
+                )
+        sizes = _sizes(self.name, declarations, dimensions, values)
+        self.variables = tuple(
+            declaration.named(self.name, key, values.get(key, declaration.start), sizes)
+            for key, declaration in declarations.items()
+        )
+        self._transitions = self._collect_transitions()
+        self.jumps = tuple(
+            JumpInfo(t.name, Trigger.STATE)
+            if isinstance(t, Jump)
+            else JumpInfo(t.name, Trigger.TIME, internal=t.internal)
+            for t in self._transitions
+        )
+        self.clocks = self._collect_clocks()
+
+    # The maps that an author writes.
+
+    def flow_map(self, s: Values) -> Assignments:
+        """Return the time derivative of each continuous state."""
+        return {}
+
+    def flow_set(self, s: Values) -> Value:
+        """Return the margin of the flow set: zero or above inside. Not overridden: flow is allowed everywhere."""
+        return 1.0
+
+    def start_map(self, s: Values) -> Assignments:
+        """Return the start values of the states declared with ``computed=True``."""
+        return {}
+
+    def outputs(self, s: Values) -> Assignments:
+        """Return the values of the declared outputs."""
+        return {}
+
+    # What executions use.
+
+    @property
+    def has_flow_set(self) -> bool:
+        """Whether ``flow_set`` is overridden."""
+        return type(self).flow_set is not HybridAutomaton.flow_set
+
+    def start_values(self, s: Values) -> Assignments:
+        """See `Automaton.start_values`."""
+        computed = [v.name for v in self.variables if v.computed]
+        return self._checked("start_map", self.start_map(s), computed, computed)
+
+    def derivatives(self, s: Values) -> Assignments:
+        """See `Automaton.derivatives`."""
+        states = [v.name for v in self.variables if v.kind is Kind.STATE]
+        return self._checked("flow_map", self.flow_map(s), states, states)
+
+    def flow_margin(self, s: Values) -> Value:
+        """See `Automaton.flow_margin`."""
+        return self._margin("flow_set", self.flow_set(s))
+
+    def jump_margins(self, s: Values) -> list[Value]:
+        """See `Automaton.jump_margins`."""
+        return [
+            self._margin(f"the jump set of {t.name!r}", t.jump_set(self, s))
+            for t in self._transitions
+            if isinstance(t, Jump)
+        ]
+
+    def event_times(self, s: Values) -> list[Value]:
+        """See `Automaton.event_times`."""
+        return [t.time(self, s) for t in self._transitions if isinstance(t, TimeEvent)]
+
+    def reset(self, jump: int, s: Values) -> Assignments:
+        """See `Automaton.reset`."""
+        transition = self._transitions[jump]
+        states = [v.name for v in self.variables if v.kind in (Kind.STATE, Kind.DISCRETE)]
+        return self._checked(f"the jump map of {transition.name!r}", transition.jump_map(self, s), states, [])
+
+    def output_values(self, s: Values) -> Assignments:
+        """See `Automaton.output_values`."""
+        declared = [v.name for v in self.variables if v.kind is Kind.OUTPUT]
+        return self._checked("outputs", self.outputs(s), declared, declared)
+
+    def _collect_transitions(self) -> tuple[Jump | TimeEvent, ...]:
+        cls = type(self)
+        single = getattr(cls, "jump_set", None), getattr(cls, "jump_map", None)
+        if (single[0] is None) != (single[1] is None):
+            raise DeclarationError(f"{self.name} has one of jump_set and jump_map: write both, or neither.")
+        own = (Jump("jump", single[0], single[1]),) if single[0] is not None and single[1] is not None else ()
+        transitions = (*own, *cls.transitions)
+        names = [t.name for t in transitions]
+        if len(set(names)) < len(names):
+            raise DeclarationError(f"{self.name} has two transitions of one name among {names}: rename one.")
+        return transitions
+
+    def _collect_clocks(self) -> tuple[ClockInfo, ...]:
+        names = [j.name for j in self.jumps]
+        clocks = []
+        for key, clock in _declared(type(self), Clock).items():
+            if clock.jump not in names:
+                raise DeclarationError(
+                    f"{self.name}.{key} ticks with jump {clock.jump!r}, but the jumps are {names}: name one of them."
+                )
+            clocks.append(ClockInfo(key, names.index(clock.jump), clock.description))
+        return tuple(clocks)
+
+    def _checked(
+        self, what: str, values: Assignments, allowed: Sequence[str], required: Sequence[str]
+    ) -> Assignments:
+        # One comparison in the good case: this runs in the inner loop of every execution.
+        if not isinstance(values, Mapping):
+            raise DeclarationError(f"{what} of {self.name} returned {values!r}: return a dictionary, name -> value.")
+        wrong = [key for key in values if key not in allowed]
+        if wrong:
+            raise DeclarationError(f"{what} of {self.name} sets {wrong}, but may set only {list(allowed)}.")
+        missing = [key for key in required if key not in values]
+        if missing:
+            raise DeclarationError(f"{what} of {self.name} must also give {missing}.")
+        return values
+
+    def _margin(self, what: str, margin: Value) -> Value:
+        if isinstance(margin, (bool, np.bool_)):
+            raise DeclarationError(
+                f"{what} of {self.name} is a boolean: return a margin instead, a number that is zero or above inside "
+                "the set (for h <= 0 return -h; join conditions with least for 'and', greatest for 'or')."
+            )
+        return margin
+
+
+def _declared(cls: type, kind: type) -> dict[str, Any]:
+    # Base classes first, so that declaration order is reading order.
+    found: dict[str, Any] = {}
+    for base in reversed(cls.__mro__):
+        for key, value in vars(base).items():
+            if isinstance(value, kind):
+                if key == "t" or hasattr(HybridAutomaton, key) or key in Automaton.__annotations__:
+                    raise DeclarationError(f"{cls.__name__} declares {key!r}, a name of the framework: choose another.")
+                found[key] = value
+    return found
+
+
+def _sizes(
+    owner: str, declarations: Mapping[str, Declaration], dimensions: Mapping[str, Dimension], values: dict[str, Any]
+) -> dict[str, int]:
+    """Find the length of each dimension, from its own value or from the vectors given."""
+    sizes: dict[str, int] = {}
+    for dimension in dimensions:
+        lengths = {dimension: int(values[dimension])} if dimension in values else {}
+        for key, declaration in declarations.items():
+            given = np.shape(values[key]) if key in values else ()
+            if dimension in declaration.shape and len(given) == len(declaration.shape):
+                lengths[key] = given[declaration.shape.index(dimension)]
+        if not lengths:
+            raise DeclarationError(f"{owner} needs the length {dimension!r}: give {dimension}=..., a whole number.")
+        if len(set(lengths.values())) > 1:
+            told = ", ".join(f"{key} says {n}" for key, n in lengths.items())
+            raise DeclarationError(f"{owner} has one length {dimension!r}, but {told}: make them equal.")
+        sizes[dimension] = next(iter(lengths.values()))
+    return sizes

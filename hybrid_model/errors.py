@@ -1,0 +1,21 @@
+"""What goes wrong, by kind; each message names the thing, the value, the rule and the remedy."""
+
+
+class HybridModelError(Exception):
+    """Base of the errors that this package raises."""
+
+
+class DeclarationError(HybridModelError, AttributeError, ValueError):
+    """An automaton is declared, instantiated or used in a way that its declaration does not allow."""
+
+
+class WiringError(HybridModelError, ValueError):
+    """Parts of a composition do not fit together."""
+
+
+class AlgebraicLoopError(HybridModelError, ValueError):
+    """Outputs of a composition depend on each other without a state in between."""
+
+
+class SimulationError(HybridModelError, RuntimeError):
+    """A run cannot start or go on: bad arguments, or a value that is not finite."""

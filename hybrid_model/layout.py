@@ -1,0 +1,114 @@
+"""Where each variable lives in the vectors that solvers and generated code work on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybrid_model.automaton import Assignments, Automaton
+from hybrid_model.errors import DeclarationError
+from hybrid_model.variables import FloatArray, Kind, Value, Values, Variable, element_names
+
+
+@dataclass(frozen=True)
+class Place:
+    """A variable's place in the vector of its kind."""
+
+    variable: Variable
+    at: slice
+
+    def take(self, vector: Value) -> Value:
+        """Return the variable's value, a scalar or an array of its shape, out of `vector`."""
+        if not self.variable.shape:
+            return vector[self.at.start]
+        part = vector[self.at]
+        return part if len(self.variable.shape) == 1 else part.reshape(self.variable.shape)
+
+
+class Layout:
+    """The vectors x, z, u, p (and y) of an automaton, and the way from vectors to values and back.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        Whose variables are laid out, kind by kind in declaration order, arrays row by row.
+    """
+
+    def __init__(self, automaton: Automaton) -> None:
+        self.automaton = automaton
+        self.places: dict[Kind, tuple[Place, ...]] = {}
+        self.sizes: dict[Kind, int] = {}
+        for kind in Kind:
+            at = 0
+            places = []
+            for variable in automaton.of_kind(kind):
+                places.append(Place(variable, slice(at, at + variable.size)))
+                at += variable.size
+            self.places[kind] = tuple(places)
+            self.sizes[kind] = at
+
+    def start(self, kind: Kind) -> FloatArray:
+        """Return the vector of start values of one kind."""
+        starts = [place.variable.start.ravel() for place in self.places[kind]]
+        return np.concatenate(starts) if starts else np.zeros(0)
+
+    def names(self, kind: Kind) -> list[str]:
+        """Return the names of the scalars in the vector of one kind."""
+        return [name for place in self.places[kind] for name in element_names(place.variable)]
+
+    def values(self, t: Value, x: Value, z: Value, u: Value, p: Value) -> Values:
+        """Return the values at one instant, by name; works for vectors of floats and of symbols."""
+        values: dict[str, Value] = {"t": t}
+        for kind, vector in ((Kind.STATE, x), (Kind.DISCRETE, z), (Kind.INPUT, u), (Kind.PARAMETER, p)):
+            for place in self.places[kind]:
+                values[place.variable.name] = place.take(vector)
+        return Values(self.automaton.name, values)
+
+    def pack(self, kind: Kind, assignments: Assignments, otherwise: FloatArray | None = None) -> FloatArray:
+        """Write values by name into a vector of floats.
+
+        Parameters
+        ----------
+        kind : Kind
+            Whose vector.
+        assignments : mapping
+            Variable name -> value.
+        otherwise : ndarray, optional
+            Values of the variables that `assignments` does not name; default zeros.
+
+        Raises
+        ------
+        DeclarationError
+            If a value has not the variable's shape.
+        """
+        vector = np.zeros(self.sizes[kind]) if otherwise is None else otherwise.copy()
+        for place in self.places[kind]:
+            name = place.variable.name
+            if name in assignments:
+                value = assignments[name]
+                try:
+                    vector[place.at] = value if not place.variable.shape else np.reshape(value, -1)
+                except (TypeError, ValueError) as error:
+                    raise DeclarationError(
+                        f"{self.automaton.name}: the value computed for {name} is {value!r}, but {name} has shape "
+                        f"{place.variable.shape}: return a number for a scalar, an array for a vector."
+                    ) from error
+        return vector
+
+    def describe(self, vectors: Mapping[Kind, FloatArray]) -> str:
+        """Return ``name = value`` for the scalars of some vectors, for messages."""
+        pairs = [
+            f"{name} = {value:.9g}"
+            for kind, vector in vectors.items()
+            for name, value in zip(self.names(kind), vector, strict=True)
+        ]
+        shown = ", ".join(pairs[:12])
+        return shown + (f", and {len(pairs) - 12} more" if len(pairs) > 12 else "")
+
+
+def not_finite(names: Sequence[str], vector: FloatArray) -> str | None:
+    """Return the first ``name = value`` that is not finite, or None."""
+    bad = np.flatnonzero(~np.isfinite(vector))
+    return None if bad.size == 0 else f"{names[bad[0]]} = {vector[bad[0]]}"

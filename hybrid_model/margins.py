@@ -1,0 +1,31 @@
+"""Set algebra on margins, in a form that runs on floats and traces on symbols."""
+
+from __future__ import annotations
+
+from functools import reduce
+
+import numpy as np
+
+from hybrid_model.variables import Value
+
+
+def least(*margins: Value) -> Value:
+    """Return the smallest margin: the intersection of sets ("and").
+
+    Parameters
+    ----------
+    *margins : float, array or symbol
+        Margins of the sets; for arrays elementwise.
+    """
+    return reduce(np.minimum, margins)
+
+
+def greatest(*margins: Value) -> Value:
+    """Return the largest margin: the union of sets ("or").
+
+    Parameters
+    ----------
+    *margins : float, array or symbol
+        Margins of the sets; for arrays elementwise.
+    """
+    return reduce(np.maximum, margins)

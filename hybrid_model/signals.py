@@ -1,0 +1,118 @@
+"""Inputs of a run: constants, functions of time, and functions with known discontinuities."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hybrid_model.errors import DeclarationError, SimulationError
+from hybrid_model.layout import Layout
+from hybrid_model.variables import FloatArray, Kind, start_array, unknown_name
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A function of time that jumps at known times.
+
+    Attributes
+    ----------
+    value : callable
+        ``value(t) -> float or array``, continuous from the right.
+    breakpoints : sequence of float
+        Times in s at which it is discontinuous; runs stop there and go on.
+    """
+
+    value: Callable[[float], npt.ArrayLike]
+    breakpoints: Sequence[float] = ()
+
+
+InputValue = npt.ArrayLike | Callable[[float], npt.ArrayLike] | Signal
+
+
+class Inputs:
+    """The input vector u of an automaton as a function of time.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the automaton.
+    given : mapping, optional
+        Input name -> number, array, function of time or `Signal`; inputs not named keep their start values.
+
+    Raises
+    ------
+    DeclarationError
+        For an unknown input or a value of the wrong shape.
+    """
+
+    def __init__(self, layout: Layout, given: Mapping[str, InputValue] | None = None) -> None:
+        self._layout = layout
+        self._held = layout.start(Kind.INPUT)
+        self._signals: list[tuple[slice, str, Callable[[float], npt.ArrayLike]]] = []
+        breakpoints: list[float] = []
+        places = {place.variable.name: place for place in layout.places[Kind.INPUT]}
+        for name, value in (given or {}).items():
+            if name not in places:
+                raise DeclarationError(unknown_name(f"{layout.automaton.name} (inputs)", name, places))
+            if isinstance(value, Signal):
+                self._signals.append((places[name].at, name, value.value))
+                breakpoints += [float(b) for b in value.breakpoints]
+            elif callable(value):
+                self._signals.append((places[name].at, name, value))
+            else:
+                self.hold(name, value)
+        self._breakpoints = sorted(breakpoints)
+
+    def hold(self, name: str, value: npt.ArrayLike) -> bool:
+        """Set an input to a constant; return whether that changed it."""
+        place = next((q for q in self._layout.places[Kind.INPUT] if q.variable.name == name), None)
+        if place is None:
+            raise DeclarationError(
+                unknown_name(f"{self._layout.automaton.name} (inputs)", name, dict.fromkeys(self.names))
+            )
+        before = self._held[place.at].copy()
+        given = start_array(f"{self._layout.automaton.name}.{name}", value)
+        if given.shape not in ((), place.variable.shape):
+            raise DeclarationError(
+                f"input {name} has shape {place.variable.shape}, but the value given has shape {given.shape}."
+            )
+        self._held[place.at] = given.ravel() if given.shape else given
+        return not np.array_equal(before, self._held[place.at])
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the inputs."""
+        return [place.variable.name for place in self._layout.places[Kind.INPUT]]
+
+    @property
+    def vary(self) -> bool:
+        """Whether some input is a function of time."""
+        return bool(self._signals)
+
+    def at(self, t: float) -> FloatArray:
+        """Return u at time `t`; the array must not be written to."""
+        if not self._signals:
+            return self._held
+        u = self._held.copy()
+        for place, name, signal in self._signals:
+            u[place] = np.ravel(signal(t))
+            if not np.all(np.isfinite(u[place])):
+                raise SimulationError(f"input {name} is {u[place]} at t = {t:.9g} s: inputs must be finite.")
+        return u
+
+    def next_breakpoint(self, t: float) -> float:
+        """Return the first breakpoint after `t`, or infinity."""
+        return next((b for b in self._breakpoints if b > t), math.inf)
+
+    def copy(self) -> Inputs:
+        """Return an independent copy."""
+        other = object.__new__(Inputs)
+        other._layout = self._layout
+        other._held = self._held.copy()
+        other._signals = self._signals
+        other._breakpoints = self._breakpoints
+        return other

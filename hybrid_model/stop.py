@@ -1,0 +1,17 @@
+"""Why runs end."""
+
+import enum
+
+
+class Stop(enum.Enum):
+    """The reason a run ended; the value is the remedy, the run's message has the particulars."""
+
+    HORIZON = "The end time was reached."
+    ZENO = (
+        "Jumps accumulate: end the run before the accumulation time, give the jump set a minimum dwell time, "
+        "or model what happens after the accumulation as a mode of its own."
+    )
+    BLOCKED = (
+        "The state is in neither set: enlarge the flow set or the jump set where the message says, "
+        "or make the jump map land in one of them."
+    )

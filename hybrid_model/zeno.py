@@ -1,0 +1,107 @@
+"""Zeno guard: recognise jumps that accumulate, and say when and why."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+HISTORY = 12
+GAPS = 8
+"""Ratios of successive gaps are compared over this many gaps: enough to tell geometric shrinking from chance."""
+
+
+@dataclass(frozen=True)
+class ZenoGuard:
+    """What counts as an accumulation of jumps (semantics: rules 7 and 8).
+
+    Only jumps on state margins are counted, each jump by itself: many agents that broadcast together are no Zeno.
+
+    Attributes
+    ----------
+    jumps_at_once : int
+        More jumps of one name than this at one instant end the run.
+    window : float
+        In s; `jumps_in_window` jumps of one name within it end the run.
+    jumps_in_window : int
+        See `window`.
+    remainder : float
+        In s; jumps whose gaps shrink geometrically end the run when the time left to the accumulation point, by the
+        sum of the geometric series, is below this.
+    spread : float
+        Relative spread up to which successive ratios of gaps count as one.
+    """
+
+    jumps_at_once: int = 1000
+    window: float = 1e-6
+    jumps_in_window: int = 100
+    remainder: float = 1e-6
+    spread: float = 0.05
+
+
+class ZenoMonitor:
+    """Watches the jumps of one run.
+
+    Parameters
+    ----------
+    guard : ZenoGuard
+        The limits.
+    """
+
+    def __init__(self, guard: ZenoGuard) -> None:
+        self.guard = guard
+        self._recent: dict[str, deque[float]] = {}
+        self._total: dict[str, int] = {}
+        self._at_once: dict[str, tuple[float, int]] = {}
+
+    def record(self, automaton: str, jump: str, t: float) -> str | None:
+        """Count a jump at time `t`.
+
+        Returns
+        -------
+        str or None
+            The message, if the run must end.
+        """
+        self._total[jump] = self._total.get(jump, 0) + 1
+        last, count = self._at_once.get(jump, (t, 0))
+        count = count + 1 if t == last else 1
+        self._at_once[jump] = (t, count)
+        if count > self.guard.jumps_at_once:
+            return (
+                f"{automaton}: {count} jumps of {jump!r} at one instant, t = {t:.9g} s: after the jump the state is "
+                "still in the jump set. Make the jump map leave the jump set, or let the margin be negative there "
+                "(a threshold that is zero together with its error fires for ever)."
+            )
+        recent = self._recent.setdefault(jump, deque(maxlen=max(HISTORY, self.guard.jumps_in_window)))
+        recent.append(t)
+        return self._crowded(automaton, jump, recent) or self._geometric(automaton, jump, recent)
+
+    def _crowded(self, automaton: str, jump: str, recent: deque[float]) -> str | None:
+        n = self.guard.jumps_in_window
+        if len(recent) < n or recent[-1] - recent[-n] > self.guard.window:
+            return None
+        if recent[-1] == recent[-n]:
+            return None  # a cascade at one instant has its own, larger budget
+        return (
+            f"{automaton}: {n} jumps of {jump!r} in {recent[-1] - recent[-n]:.2g} s around t = {recent[-1]:.9g} s: "
+            "jumps accumulate there. End the run before, or give the jump set a minimum dwell time."
+        )
+
+    def _geometric(self, automaton: str, jump: str, recent: deque[float]) -> str | None:
+        if len(recent) < GAPS + 1:
+            return None
+        times = list(recent)[-(GAPS + 1) :]
+        gaps = [b - a for a, b in zip(times[:-1], times[1:], strict=True)]
+        if min(gaps) <= 0.0:
+            return None
+        ratios = [b / a for a, b in zip(gaps[:-1], gaps[1:], strict=True)]
+        ratio = ratios[-1]
+        if max(ratios) >= 1.0 or max(ratios) - min(ratios) > self.guard.spread * ratio:
+            return None
+        left = gaps[-1] * ratio / (1.0 - ratio)
+        if left > self.guard.remainder * max(1.0, abs(times[-1])):
+            return None
+        return (
+            f"{automaton}: {self._total[jump]} jumps of {jump!r} accumulate at t = {times[-1] + left:.9g} s (the last "
+            f"gap was {gaps[-1]:.2g} s, each {ratio:.3f} times the one before). End the run before that time, or give "
+            "the jump set a minimum dwell time."
+        )
