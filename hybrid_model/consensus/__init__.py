@@ -1,0 +1,1 @@
+"""Event-triggered consensus of single integrators over time-varying graphs."""

@@ -1,0 +1,104 @@
+"""Switching of the active edges: cyclic with a fixed dwell time, or none."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid_model.consensus.gating import dwell_boundary, dwell_index
+
+__all__ = ["NoSwitching", "PeriodicSwitching", "Switching", "dwell_boundary", "dwell_index"]
+
+
+@dataclass(frozen=True)
+class PeriodicSwitching:
+    """Cyclic switching: during dwell interval j the edges ``active[j mod phases]`` may carry weight, the others not.
+
+    Parameters
+    ----------
+    dwell : float
+        Length of each dwell interval [s], positive; interval 0 starts at t = 0.
+    active : tuple of tuple of int
+        One tuple of edge numbers, counted from 1, for each phase of the cycle. A phase may be empty.
+    edge_count : int
+        Number of edges of the network.
+
+    Raises
+    ------
+    ValueError
+        If the dwell is not a positive number, no phase is given, or an edge number is out of range or repeated.
+
+    Notes
+    -----
+    Source: paper, section 6 (switching topologies) and section 7 (two trees "in contiguous intervals").
+    """
+
+    dwell: float
+    active: tuple[tuple[int, ...], ...]
+    edge_count: int
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if not (math.isfinite(self.dwell) and self.dwell > 0):
+            raise ValueError(f"dwell is {self.dwell}; it must be a positive, finite number of seconds.")
+        if not self.active:
+            raise ValueError("active is empty; it must list the active edges of at least one phase.")
+        for number, edges in enumerate(self.active, start=1):
+            for edge in edges:
+                if not 1 <= edge <= self.edge_count:
+                    raise ValueError(
+                        f"active phase {number} names edge {edge}; edges are numbered from 1 to {self.edge_count}."
+                    )
+            if len(set(edges)) < len(edges):
+                raise ValueError(f"active phase {number} is {list(edges)}; each edge may be listed only once.")
+
+    @property
+    def period(self) -> float:
+        """Length of the whole cycle [s]; 0.0 if all phases have the same active edges."""
+        is_constant = all(set(edges) == set(self.active[0]) for edges in self.active)
+        return 0.0 if is_constant else self.dwell * len(self.active)
+
+    def phase(self, t: float) -> int:
+        """Index, from 0, of the phase that holds time `t` [s]; at a switching instant, of the phase that begins."""
+        return int(dwell_index(t, self.dwell)) % len(self.active)
+
+    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
+        """Switching instants strictly between `t0` and `t1` [s], ascending."""
+        times: NDArray[np.float64] = dwell_boundary(
+            np.arange(dwell_index(t0, self.dwell), dwell_index(t1, self.dwell)), self.dwell
+        )
+        return times[(times > t0) & (times < t1)]
+
+    def active_at(self, t: float) -> NDArray[np.bool_]:
+        """Mask, shape (edge_count,), of the edges that are active at time `t` [s]."""
+        mask = np.zeros(self.edge_count, dtype=bool)
+        mask[[edge - 1 for edge in self.active[self.phase(t)]]] = True
+        return mask
+
+
+@dataclass(frozen=True)
+class NoSwitching:
+    """All edges active at all times, with the interface of `PeriodicSwitching`."""
+
+    edge_count: int
+
+    @property
+    def period(self) -> float:
+        """0.0: nothing changes."""
+        return 0.0
+
+    def phase(self, t: float) -> int:
+        """0, the only phase."""
+        return 0
+
+    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
+        """None: an empty array."""
+        return np.empty(0)
+
+    def active_at(self, t: float) -> NDArray[np.bool_]:
+        """Mask of shape (edge_count,), all true."""
+        return np.ones(self.edge_count, dtype=bool)
+
+
+Switching = PeriodicSwitching | NoSwitching

@@ -1,0 +1,263 @@
+"""Weights of edges as functions of time: value, breakpoints, exact integral, period.
+
+A weight is a piecewise-constant amplitude times a carrier, ``w(t) = amplitude(t)*carrier(t)``. Edges whose carriers are
+equal share one shape; on such a piece the weighted Laplacian is a constant matrix times a scalar, and the flow of the
+consensus dynamics is a matrix exponential of a closed-form integral.
+"""
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hybrid_model.consensus.gating import (
+    Expression,
+    gate_boundary,
+    gate_segment,
+    gated_sine,
+    half_wave,
+    half_wave_boundary,
+)
+from hybrid_model.consensus.periods import common_period
+
+__all__ = [
+    "Carrier",
+    "ConstantWeight",
+    "GatedSine",
+    "SineCarrier",
+    "UnitCarrier",
+    "Waveform",
+    "WeightMap",
+    "apply_map",
+    "gate_boundary",
+    "gate_segment",
+    "gated_sine",
+    "half_wave",
+    "half_wave_boundary",
+]
+
+
+class WeightMap(enum.Enum):
+    """How a signed signal g becomes a weight w >= 0 (audit, section 9: w = g itself is not admissible)."""
+
+    SQUARE = "square"
+    ABS = "abs"
+
+
+def apply_map(g: Expression, weight_map: WeightMap) -> Expression:
+    """``g**2`` or ``|g|``; traceable in `g`."""
+    if weight_map is WeightMap.SQUARE:
+        return g**2
+    return np.abs(g)
+
+
+@dataclass(frozen=True)
+class UnitCarrier:
+    """The carrier 1 of a weight that is constant on each piece."""
+
+    def value(self, t: ArrayLike) -> NDArray[np.float64]:
+        """1 at every time `t` [s]."""
+        return np.ones(np.shape(t))
+
+    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
+        """``t1 - t0`` [s]."""
+        return np.asarray(np.asarray(t1, dtype=float) - np.asarray(t0, dtype=float))
+
+
+@dataclass(frozen=True)
+class SineCarrier:
+    """The open-gate shape ``4*sin(rate*t)**2`` or ``2*|sin(rate*t)|``; `rate` in rad/s."""
+
+    rate: float
+    map: WeightMap
+
+    def value(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Value at time `t` [s], the gate being open."""
+        open_segment = 0
+        return np.asarray(apply_map(gated_sine(np.asarray(t, dtype=float), open_segment, self.rate), self.map))
+
+    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
+        """Integral from `t0` to `t1` [s] in closed form, without cancellation between two large primitives."""
+        start, end = np.asarray(t0, dtype=float), np.asarray(t1, dtype=float)
+        if self.map is WeightMap.SQUARE:
+            wave = np.cos(self.rate * (start + end)) * np.sin(self.rate * (end - start))
+            return np.asarray(2 * (end - start) - 2 / self.rate * wave)
+        # Each half wave of 2|sin| has the area 4/rate; the cosines are those of the angle within a half wave.
+        h0, h1 = half_wave(start, self.rate), half_wave(end, self.rate)
+        cosines = np.cos(self.rate * start - np.pi * h0) - np.cos(self.rate * end - np.pi * h1)
+        return np.asarray(2 / self.rate * (2 * (h1 - h0) + cosines))
+
+
+Carrier = UnitCarrier | SineCarrier
+
+
+@dataclass(frozen=True)
+class ConstantWeight:
+    """A weight that does not change: ``w(t) = level``.
+
+    Parameters
+    ----------
+    level : float
+        The weight, finite and not negative.
+
+    Raises
+    ------
+    ValueError
+        If the level is negative or not finite.
+    """
+
+    level: float
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        _require("level", self.level, self.level >= 0, "must not be negative")
+
+    @property
+    def carrier(self) -> UnitCarrier:
+        """The carrier 1."""
+        return UnitCarrier()
+
+    @property
+    def period(self) -> float:
+        """0.0: every number is a period of a constant."""
+        return 0.0
+
+    def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
+        """The level, in the shape of `t` [s]."""
+        return np.full(np.shape(t), float(self.level))
+
+    def value(self, t: ArrayLike) -> NDArray[np.float64]:
+        """The level, in the shape of `t` [s]."""
+        return self.amplitude(t)
+
+    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
+        """None: an empty array."""
+        return np.empty(0)
+
+    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
+        """``level*(t1 - t0)``; times in seconds."""
+        return self.level * self.carrier.integral(t0, t1)
+
+
+@dataclass(frozen=True)
+class GatedSine:
+    """The weight ``w = g**2`` or ``|g|`` of ``g = (square(gate_rate*t - phase, duty_percent) + 1)*sin(sine_rate*t)``.
+
+    Parameters
+    ----------
+    gate_rate, sine_rate : float
+        Angular rates [rad/s], positive.
+    duty_percent : float
+        Open share of each gate period, 0 to 100 [%].
+    phase : float
+        Phase of the gate [rad].
+    map : WeightMap
+        SQUARE (the reading under which the paper's example is persistently exciting) or ABS.
+
+    Raises
+    ------
+    ValueError
+        If a number is outside its range or not finite.
+
+    Notes
+    -----
+    Source: paper, section 7; audit, section 9 for the choice of the map and for the closed-form integrals.
+    """
+
+    gate_rate: float
+    sine_rate: float
+    duty_percent: float
+    phase: float = 0.0
+    map: WeightMap = WeightMap.SQUARE
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        _require("gate_rate", self.gate_rate, self.gate_rate > 0, "must be positive")
+        _require("sine_rate", self.sine_rate, self.sine_rate > 0, "must be positive")
+        _require("duty_percent", self.duty_percent, 0 <= self.duty_percent <= 100, "must lie between 0 and 100")
+        _require("phase", self.phase, True, "must be finite")
+
+    @property
+    def carrier(self) -> SineCarrier:
+        """The shape of the weight while the gate is open."""
+        return SineCarrier(self.sine_rate, self.map)
+
+    @property
+    def period(self) -> float | None:
+        """A period [s] of the weight, 0.0 if it is zero throughout, None if gate and sine are not commensurable.
+
+        Both maps fold the sine, so the carrier has the period ``pi/sine_rate``.
+        """
+        if self.duty_percent == 0:
+            return 0.0
+        carrier_period = math.pi / self.sine_rate
+        if self.duty_percent == 100:
+            return carrier_period
+        return common_period((2 * math.pi / self.gate_rate, carrier_period))
+
+    def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
+        """1 where the gate is open at `t` [s], else 0."""
+        segment = self._segment(np.asarray(t, dtype=float))
+        return np.asarray(1.0 - segment % 2)
+
+    def value(self, t: ArrayLike) -> NDArray[np.float64]:
+        """The weight at `t` [s], in the shape of `t`."""
+        time = np.asarray(t, dtype=float)
+        return np.asarray(apply_map(gated_sine(time, self._segment(time), self.sine_rate), self.map))
+
+    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
+        """Times strictly between `t0` and `t1` [s], ascending, at which the weight jumps or has a kink.
+
+        These are the gate's boundaries and, for ABS, the zeros of the sine inside open windows.
+        """
+        times = np.empty(0)
+        if 0 < self.duty_percent < 100:
+            times = self._boundary(np.arange(self._segment(t0), self._segment(t1)))
+        if self.map is WeightMap.ABS:
+            zeros = half_wave_boundary(
+                np.arange(half_wave(t0, self.sine_rate), half_wave(t1, self.sine_rate)), self.sine_rate
+            )
+            times = np.union1d(times, zeros[self.amplitude(zeros) > 0])
+        return times[(times > t0) & (times < t1)]
+
+    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
+        """Exact integral of the weight from `t0` to `t1` [s]; the two broadcast against each other."""
+        begin, end = np.broadcast_arrays(np.asarray(t0, dtype=float), np.asarray(t1, dtype=float))
+        if begin.size == 0:
+            return np.zeros(begin.shape)
+        first, last = float(min(begin.min(), end.min())), float(max(begin.max(), end.max()))
+        windows = np.arange(self._window(first), self._window(last) + 1)
+        # Cutting the first window at the earliest time makes its primitive zero there: a scalar integral is then one
+        # sum of positive terms, with no difference of two large numbers.
+        opens = np.maximum(self._boundary(2 * windows - 1), first)
+        closes = np.maximum(self._boundary(2 * windows), opens)
+        before = np.concatenate(([0.0], np.cumsum(self.carrier.integral(opens, closes))))
+
+        def primitive(t: NDArray[np.float64]) -> NDArray[np.float64]:
+            index = (self._window(t) - windows[0]).astype(int)
+            within = np.clip(t, opens[index], closes[index])
+            return np.asarray(before[index] + self.carrier.integral(opens[index], within))
+
+        return primitive(end) - primitive(begin)
+
+    def _segment(self, t: Any) -> Any:
+        return gate_segment(t, self.gate_rate, self.phase, self.duty_percent)
+
+    def _window(self, t: Any) -> Any:
+        return np.floor(self._segment(t) / 2)
+
+    def _boundary(self, k: Any) -> Any:
+        return gate_boundary(k, self.gate_rate, self.phase, self.duty_percent)
+
+
+Waveform = ConstantWeight | GatedSine
+
+
+def _require(name: str, value: float, is_valid: bool, rule: str) -> None:
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is {value}; it must be a finite number.")
+    if not is_valid:
+        raise ValueError(f"{name} is {value}; it {rule}.")
