@@ -1,0 +1,146 @@
+"""All edge weights of a network together, the diagonal of the paper's W(t): waveforms and switching in one place."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hybrid_model.consensus.periods import common_period
+from hybrid_model.consensus.switching import Switching
+from hybrid_model.consensus.weights import Carrier, Waveform
+
+__all__ = ["EdgeWeights", "Piece"]
+
+_MERGE = 16 * np.finfo(float).eps
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A time interval without breakpoints; on it ``w_e(t) = amplitudes[e]*carriers[e].value(t)``.
+
+    Parameters
+    ----------
+    start, end : float
+        The interval [s].
+    amplitudes : ndarray, shape (m,)
+        Constant on the interval; 0 for an edge that is switched off or whose gate is closed.
+    carriers : tuple of Carrier
+        One for each edge.
+    """
+
+    start: float
+    end: float
+    amplitudes: NDArray[np.float64]
+    carriers: tuple[Carrier, ...]
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether no edge carries weight."""
+        return not self.amplitudes.any()
+
+    @property
+    def shared_carrier(self) -> Carrier | None:
+        """The carrier of all edges that carry weight, or None if there is no such edge or they differ."""
+        active = {carrier for carrier, amplitude in zip(self.carriers, self.amplitudes, strict=True) if amplitude > 0}
+        return active.pop() if len(active) == 1 else None
+
+
+@dataclass(frozen=True)
+class EdgeWeights:
+    """Weights of all m edges as functions of time, switching included.
+
+    Parameters
+    ----------
+    waveforms : tuple of Waveform
+        One for each edge.
+    switching : Switching
+        Which edges are active when.
+
+    Raises
+    ------
+    ValueError
+        If the switching is made for another number of edges.
+    """
+
+    waveforms: tuple[Waveform, ...]
+    switching: Switching
+
+    def __post_init__(self) -> None:
+        """Check that both parts mean the same edges."""
+        if self.switching.edge_count != len(self.waveforms):
+            raise ValueError(
+                f"there are {len(self.waveforms)} waveforms, but the switching is for {self.switching.edge_count} "
+                "edges; give one waveform for each edge."
+            )
+
+    @property
+    def carriers(self) -> tuple[Carrier, ...]:
+        """The carrier of each edge."""
+        return tuple(waveform.carrier for waveform in self.waveforms)
+
+    @property
+    def period(self) -> float | None:
+        """A common period [s] of all weights; 0.0 if all are constant; None if there is none."""
+        return common_period([self.switching.period, *(waveform.period for waveform in self.waveforms)])
+
+    def amplitudes(self, t: float) -> NDArray[np.float64]:
+        """Amplitudes of the edges at `t` [s], shape (m,); zero where an edge is not active."""
+        amplitudes = np.array([float(waveform.amplitude(t)) for waveform in self.waveforms])
+        return amplitudes * self.switching.active_at(t)
+
+    def value(self, t: float) -> NDArray[np.float64]:
+        """Weights of the edges at `t` [s], shape (m,): the diagonal of W(t)."""
+        values = np.array([float(waveform.value(t)) for waveform in self.waveforms])
+        return values * self.switching.active_at(t)
+
+    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
+        """Times strictly between `t0` and `t1` [s], ascending, at which a weight may jump or have a kink.
+
+        Times that agree up to rounding (a gate and a switching instant that mean the same number) are merged.
+        """
+        times = np.unique(
+            np.concatenate(
+                [self.switching.breakpoints(t0, t1), *(waveform.breakpoints(t0, t1) for waveform in self.waveforms)]
+            )
+        )
+        scale = max(abs(t0), abs(t1))
+        is_new = np.diff(times, prepend=t0) > _MERGE * scale
+        return times[is_new & (t1 - times > _MERGE * scale)]
+
+    def pieces(self, t0: float, t1: float) -> list[Piece]:
+        """The interval from `t0` to `t1` [s], cut at the breakpoints."""
+        times = [t0, *self.breakpoints(t0, t1).tolist(), t1]
+        carriers = self.carriers
+        # The amplitude is taken at the middle, where rounding of a boundary cannot pick the neighbouring segment.
+        return [Piece(a, b, self.amplitudes((a + b) / 2), carriers) for a, b in pairwise(times) if a < b]
+
+    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
+        """Exact integrals of the weights from `t0` to `t1` [s], shape (..., m) for broadcast times of shape (...)."""
+        begin, end = np.broadcast_arrays(np.asarray(t0, dtype=float), np.asarray(t1, dtype=float))
+        first, last = float(min(begin.min(), end.min())), float(max(begin.max(), end.max()))
+        cuts = np.array([first, *self.switching.breakpoints(first, last).tolist(), last])
+        masks = np.array([self.switching.active_at((a + b) / 2) for a, b in pairwise(cuts)])
+        columns = [
+            _masked_integral(waveform, cuts, masks[:, edge], begin, end) for edge, waveform in enumerate(self.waveforms)
+        ]
+        return np.stack(columns, axis=-1)
+
+
+def _masked_integral(
+    waveform: Waveform,
+    cuts: NDArray[np.float64],
+    mask: NDArray[np.bool_],
+    begin: NDArray[np.float64],
+    end: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Integral of one waveform over the dwell intervals between `cuts` in which `mask` is true."""
+    if mask.all():
+        return waveform.integral(begin, end)
+    before = np.concatenate(([0.0], np.cumsum(mask * waveform.integral(cuts[:-1], cuts[1:]))))
+
+    def primitive(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        index = np.clip(np.searchsorted(cuts, t, side="right") - 1, 0, len(mask) - 1)
+        return np.asarray(before[index] + mask[index] * waveform.integral(cuts[index], t))
+
+    return primitive(end) - primitive(begin)
