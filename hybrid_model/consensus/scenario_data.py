@@ -1,0 +1,252 @@
+"""A scenario: the network, its weights, its switching and its trigger, as immutable and checked data."""
+
+import enum
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hybrid_model.consensus.edge_weights import EdgeWeights
+from hybrid_model.consensus.graphs import Edge, complete_edges, validate_edges
+from hybrid_model.consensus.switching import Switching
+from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.weights import ConstantWeight, Waveform
+
+__all__ = [
+    "Network",
+    "Scenario",
+    "Trigger",
+    "TriggerKind",
+    "Underlying",
+    "WeightKind",
+    "Weights",
+    "replace_trigger",
+]
+
+
+class Underlying(enum.Enum):
+    """Which edges the edge states x_e are taken over."""
+
+    LISTED = "listed"
+    COMPLETE = "complete"
+
+
+class WeightKind(enum.Enum):
+    """The families of waveforms that a scenario file can name."""
+
+    GATED_SINE = "gated-sine"
+    CONSTANT = "constant"
+
+
+class TriggerKind(enum.Enum):
+    """The trigger functions of the paper, section 4."""
+
+    STATIC = "static"
+    DYNAMIC = "dynamic"
+
+
+@dataclass(frozen=True)
+class Network:
+    """Agents, the edges that can carry weight, the initial states and the gain.
+
+    Parameters
+    ----------
+    agents : int
+        Number of agents n.
+    edges : tuple of Edge
+        The m edges that can carry weight; agents count from 1.
+    initial : tuple of float
+        Initial states, one for each agent.
+    gain : float
+        The gain k > 0 of the control law (paper, section 3).
+    underlying : Underlying
+        COMPLETE if the underlying graph is the complete graph on the agents, LISTED if it has the listed edges only.
+
+    Raises
+    ------
+    ScenarioError
+        If the edges are not those of a simple graph, or a number is missing, not finite or out of range.
+    """
+
+    agents: int
+    edges: tuple[Edge, ...]
+    initial: tuple[float, ...]
+    gain: float = 1.0
+    underlying: Underlying = Underlying.LISTED
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        if self.agents < 2:
+            raise ScenarioError(f"[network] agents is {self.agents}; consensus needs at least 2 agents.")
+        try:
+            validate_edges(self.agents, self.edges)
+        except ValueError as error:
+            raise ScenarioError(f"[network] {error}") from None
+        if len(self.initial) != self.agents:
+            raise ScenarioError(
+                f"[network] initial lists {len(self.initial)} numbers for {self.agents} agents; give one each."
+            )
+        for agent, value in enumerate(self.initial, start=1):
+            _require_finite(f"[network] initial[{agent}]", value)
+        _require_positive("[network] gain", self.gain)
+
+    @cached_property
+    def underlying_edges(self) -> tuple[Edge, ...]:
+        """Edges of the underlying graph: the listed ones first, in their order."""
+        return complete_edges(self.agents, self.edges) if self.underlying is Underlying.COMPLETE else self.edges
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The waveform of each edge, all of one kind.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no waveform or the kinds differ.
+    """
+
+    waveforms: tuple[Waveform, ...]
+
+    def __post_init__(self) -> None:
+        """Check that there is one kind."""
+        if len({type(waveform) for waveform in self.waveforms}) != 1:
+            raise ScenarioError("[weights] must hold at least one waveform, and all of the same kind.")
+
+    @property
+    def kind(self) -> WeightKind:
+        """The family of the waveforms."""
+        return WeightKind.CONSTANT if isinstance(self.waveforms[0], ConstantWeight) else WeightKind.GATED_SINE
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """The trigger ``|xhat_i - x_i| > threshold*exp(-decay*t)`` (paper, section 4).
+
+    Parameters
+    ----------
+    kind : TriggerKind
+        STATIC has no decay.
+    threshold : float
+        c > 0, in the unit of the states.
+    decay : float
+        beta >= 0 [1/s].
+
+    Raises
+    ------
+    ScenarioError
+        If a number is out of range, or a static trigger is given a decay.
+    """
+
+    kind: TriggerKind
+    threshold: float
+    decay: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        _require_positive("[trigger] threshold", self.threshold)
+        _require_finite("[trigger] decay", self.decay)
+        if self.decay < 0:
+            raise ScenarioError(f"[trigger] decay is {self.decay}; it must not be negative.")
+        if self.kind is TriggerKind.STATIC and self.decay != 0:
+            raise ScenarioError(
+                f"[trigger] decay is {self.decay}, but the static trigger has a constant threshold; "
+                "leave decay out or set kind = 'dynamic'."
+            )
+
+    def level(self, t: ArrayLike) -> NDArray[np.float64]:
+        """The threshold at time `t` [s]."""
+        return np.asarray(self.threshold * np.exp(-self.decay * np.asarray(t, dtype=float)))
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """Everything that a run needs.
+
+    Parameters
+    ----------
+    name : str
+        Name in reports.
+    stop_time : float
+        End of the run [s], positive; it begins at t = 0.
+    network : Network
+        Agents and edges.
+    weights : Weights
+        One waveform for each edge.
+    switching : Switching
+        Which edges are active when; ``NoSwitching(edge_count)`` for all of them at all times.
+    trigger : Trigger
+        When an agent broadcasts.
+
+    Raises
+    ------
+    ScenarioError
+        If the parts are not made for the same number of edges, or the stop time is not positive.
+    """
+
+    name: str
+    stop_time: float
+    network: Network
+    weights: Weights
+    switching: Switching
+    trigger: Trigger
+
+    def __post_init__(self) -> None:
+        """Check that the parts fit."""
+        if not self.name:
+            raise ScenarioError("name is empty; a scenario needs a name for its reports.")
+        _require_positive("stop_time", self.stop_time)
+        edge_count = len(self.network.edges)
+        counts = {"[weights]": len(self.weights.waveforms), "[switching]": self.switching.edge_count}
+        for table, count in counts.items():
+            if count != edge_count:
+                raise ScenarioError(
+                    f"{table} is made for {count} edges, but [network] lists {edge_count}; they must be the same edges."
+                )
+
+    @cached_property
+    def edge_weights(self) -> EdgeWeights:
+        """Weights of the listed edges as functions of time, switching included."""
+        return EdgeWeights(self.weights.waveforms, self.switching)
+
+
+def replace_trigger(scenario: Scenario, kind: TriggerKind | str) -> Scenario:
+    """The same scenario with the static or the dynamic trigger, keeping its threshold and its name.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        The scenario; it is not changed.
+    kind : TriggerKind or str
+        "static" drops the decay. "dynamic" leaves a scenario with a dynamic trigger as it is.
+
+    Raises
+    ------
+    ScenarioError
+        If the kind is unknown, or a dynamic trigger is asked for and there is no decay to use.
+    """
+    names = [member.value for member in TriggerKind]
+    if isinstance(kind, str) and kind not in names:
+        raise ScenarioError(f"trigger kind is '{kind}'; it must be one of {', '.join(names)}.")
+    wanted = TriggerKind(kind)
+    if wanted is scenario.trigger.kind:
+        return scenario
+    if wanted is TriggerKind.DYNAMIC:
+        raise ScenarioError(
+            f"scenario '{scenario.name}' has the static trigger and so no decay for a dynamic one; "
+            "give it a trigger with kind = 'dynamic' and a decay."
+        )
+    return replace(scenario, trigger=Trigger(wanted, scenario.trigger.threshold))
+
+
+def _require_finite(name: str, value: float) -> None:
+    if not math.isfinite(value):
+        raise ScenarioError(f"{name} is {value}; it must be a finite number.")
+
+
+def _require_positive(name: str, value: float) -> None:
+    _require_finite(name, value)
+    if value <= 0:
+        raise ScenarioError(f"{name} is {value}; it must be positive.")

@@ -1,0 +1,147 @@
+"""Reading typed values out of TOML tables, with errors that name the table, the key, the value and the rule."""
+
+import difflib
+import enum
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeVar
+
+__all__ = ["ScenarioError", "Table", "suggestion"]
+
+Choice = TypeVar("Choice", bound=enum.Enum)
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be run; the message names the entry, its value, the rule and the remedy."""
+
+
+def suggestion(name: str, known: Iterable[str]) -> str:
+    """`` Did you mean '...'?`` with the nearest of the `known` names, or nothing if none is near."""
+    nearest = difflib.get_close_matches(name, list(known), n=1)
+    return f" Did you mean '{nearest[0]}'?" if nearest else ""
+
+
+class Table:
+    """One table of a scenario file.
+
+    Parameters
+    ----------
+    name : str
+        How messages call it, such as ``[network]``.
+    entries : Mapping
+        Its parsed entries.
+    known : iterable of str
+        The keys that it may have.
+
+    Raises
+    ------
+    ScenarioError
+        If there is a key that is not known.
+    """
+
+    def __init__(self, name: str, entries: Mapping[str, Any], known: Iterable[str]) -> None:
+        """Check the keys."""
+        self.name = name
+        self._entries = entries
+        names = list(known)
+        for key in entries:
+            if key not in names:
+                raise ScenarioError(
+                    f"{name} has the unknown key '{key}'.{suggestion(key, names)} Known keys: {', '.join(names)}."
+                )
+
+    def __contains__(self, key: str) -> bool:
+        """Whether the key is given."""
+        return key in self._entries
+
+    def error(self, key: str, value: object, rule: str) -> ScenarioError:
+        """The error for a value that breaks a rule ("it must ...")."""
+        return ScenarioError(f"{self.name} {key} is {_shown(value)}; it {rule}.")
+
+    def raw(self, key: str, rule: str) -> Any:
+        """The entry as parsed; ScenarioError if it is missing."""
+        if key not in self._entries:
+            raise ScenarioError(f"{self.name} has no '{key}'; it {rule}.")
+        return self._entries[key]
+
+    def text(self, key: str) -> str:
+        """A string."""
+        rule = "must be a string"
+        value = self.raw(key, rule)
+        if not isinstance(value, str):
+            raise self.error(key, value, rule)
+        return value
+
+    def choice(self, key: str, choices: type[Choice], default: Choice | None = None) -> Choice:
+        """A member of an enumeration, by its value."""
+        if default is not None and key not in self:
+            return default
+        names = [member.value for member in choices]
+        rule = "must be one of " + ", ".join(f"'{name}'" for name in names)
+        value = self.raw(key, rule)
+        if not isinstance(value, str) or value not in names:
+            raise ScenarioError(f"{self.name} {key} is {_shown(value)}; it {rule}.{suggestion(str(value), names)}")
+        return choices(value)
+
+    def number(self, key: str, default: float | None = None) -> float:
+        """A finite number."""
+        if default is not None and key not in self:
+            return default
+        return self._as_number(key, self.raw(key, "must be a number"))
+
+    def numbers(self, key: str) -> tuple[float, ...]:
+        """A list of finite numbers."""
+        return tuple(self._as_number(f"{key}[{place}]", value) for place, value in self._listed(key, "numbers"))
+
+    def whole_number(self, key: str) -> int:
+        """An integer."""
+        return self._as_whole_number(key, self.raw(key, "must be a whole number"))
+
+    def whole_number_lists(self, key: str) -> tuple[tuple[int, ...], ...]:
+        """A list of lists of integers."""
+        rows = []
+        for place, row in self._listed(key, "lists of whole numbers"):
+            name = f"{key}[{place}]"
+            if not isinstance(row, list):
+                raise self.error(name, row, "must be a list of whole numbers")
+            rows.append(tuple(self._as_whole_number(f"{name}[{k}]", value) for k, value in enumerate(row, start=1)))
+        return tuple(rows)
+
+    def per_edge(self, key: str, edge_count: int, default: float | None = None) -> tuple[float, ...]:
+        """A number for each edge: a list of `edge_count` numbers, or one number that stands for all edges."""
+        if not isinstance(self._entries.get(key), list):
+            return (self.number(key, default),) * edge_count
+        values = self.numbers(key)
+        if len(values) != edge_count:
+            raise ScenarioError(
+                f"{self.name} {key} lists {len(values)} numbers for {edge_count} edges; "
+                "give one number for each edge, or a single number for all."
+            )
+        return values
+
+    def _listed(self, key: str, of_what: str) -> enumerate[Any]:
+        rule = f"must be a list of {of_what}"
+        value = self.raw(key, rule)
+        if not isinstance(value, list):
+            raise self.error(key, value, rule)
+        return enumerate(value, start=1)
+
+    def _as_number(self, key: str, value: object) -> float:
+        # A TOML boolean is an int to Python; "gain = true" is a slip, not the number 1.
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.error(key, value, "must be a number")
+        if abs(value) > 1e300 or not math.isfinite(value):
+            raise self.error(key, value, "must be a finite number")
+        return float(value)
+
+    def _as_whole_number(self, key: str, value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise self.error(key, value, "must be a whole number")
+        return value
+
+
+def _shown(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    shown = f"'{value}'" if isinstance(value, str) else str(value)
+    return shown if len(shown) <= 60 else shown[:57] + "..."
