@@ -312,9 +312,7 @@ class HybridAutomaton(Automaton):
             clocks.append(ClockInfo(key, names.index(clock.jump), clock.description))
         return tuple(clocks)
 
-    def _checked(
-        self, what: str, values: Assignments, allowed: Sequence[str], required: Sequence[str]
-    ) -> Assignments:
+    def _checked(self, what: str, values: Assignments, allowed: Sequence[str], required: Sequence[str]) -> Assignments:
         # One comparison in the good case: this runs in the inner loop of every execution.
         if not isinstance(values, Mapping):
             raise DeclarationError(f"{what} of {self.name} returned {values!r}: return a dictionary, name -> value.")

@@ -42,7 +42,7 @@ def rise_in_samples(times: FloatArray, samples: FloatArray, margin: Margin) -> t
     for k in range(1, len(times)):
         if samples[k - 1] < 0.0 <= samples[k]:
             return float(times[k - 1]), float(times[k])
-        if 1 < k and samples[k - 2] < samples[k - 1] < 0.0 and samples[k] < samples[k - 1]:
+        if k > 1 and samples[k - 2] < samples[k - 1] < 0.0 and samples[k] < samples[k - 1]:
             top = _top(times[k - 2 : k + 1], samples[k - 2 : k + 1], margin)
             if top is not None:
                 return float(times[k - 2]), top

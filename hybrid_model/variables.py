@@ -302,5 +302,3 @@ def element_names(variable: Variable) -> list[str]:
         return [variable.name]
     indices = np.ndindex(*variable.shape)
     return [f"{variable.name}[{','.join(str(i + 1) for i in index)}]" for index in indices]
-
-

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
 from dataclasses import dataclass
 
@@ -90,10 +91,10 @@ class ZenoMonitor:
         if len(recent) < GAPS + 1:
             return None
         times = list(recent)[-(GAPS + 1) :]
-        gaps = [b - a for a, b in zip(times[:-1], times[1:], strict=True)]
+        gaps = [b - a for a, b in itertools.pairwise(times)]
         if min(gaps) <= 0.0:
             return None
-        ratios = [b / a for a, b in zip(gaps[:-1], gaps[1:], strict=True)]
+        ratios = [b / a for a, b in itertools.pairwise(gaps)]
         ratio = ratios[-1]
         if max(ratios) >= 1.0 or max(ratios) - min(ratios) > self.guard.spread * ratio:
             return None

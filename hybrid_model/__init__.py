@@ -1,0 +1,53 @@
+"""Hybrid automata: declare them once, run them event-exactly, export and co-simulate them."""
+
+from hybrid_model.arc import HybridArc
+from hybrid_model.automaton import Automaton, Clock, HybridAutomaton, Jump, Priority, TimeEvent
+from hybrid_model.compose import Composition
+from hybrid_model.errors import (
+    AlgebraicLoopError,
+    DeclarationError,
+    HybridModelError,
+    SimulationError,
+    WiringError,
+)
+from hybrid_model.execution import Execution, JumpRecord
+from hybrid_model.margins import greatest, least
+from hybrid_model.signals import Signal
+from hybrid_model.simulate import simulate
+from hybrid_model.solver import Method, Solver
+from hybrid_model.stop import Stop
+from hybrid_model.variables import Dimension, DiscreteState, Input, Output, Parameter, State, Values
+from hybrid_model.zeno import ZenoGuard
+
+__all__ = [
+    "AlgebraicLoopError",
+    "Automaton",
+    "Clock",
+    "Composition",
+    "DeclarationError",
+    "Dimension",
+    "DiscreteState",
+    "Execution",
+    "HybridArc",
+    "HybridAutomaton",
+    "HybridModelError",
+    "Input",
+    "Jump",
+    "JumpRecord",
+    "Method",
+    "Output",
+    "Parameter",
+    "Priority",
+    "Signal",
+    "SimulationError",
+    "Solver",
+    "State",
+    "Stop",
+    "TimeEvent",
+    "Values",
+    "WiringError",
+    "ZenoGuard",
+    "greatest",
+    "least",
+    "simulate",
+]

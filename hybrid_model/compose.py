@@ -1,0 +1,308 @@
+"""Composition: one automaton out of many, wired by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hybrid_model.automaton import Assignments, Automaton, ClockInfo, JumpInfo, Priority, Trigger
+from hybrid_model.errors import AlgebraicLoopError, WiringError
+from hybrid_model.layout import Layout
+from hybrid_model.variables import Kind, Value, Values, Variable, unknown_name
+
+Source = str | Sequence[str]
+"""``"part.output"``, or one such name per element of a vector input."""
+
+
+@dataclass(frozen=True)
+class _Wire:
+    """Where a part's input comes from: (part, variable) per element, or one for the whole input."""
+
+    sources: tuple[tuple[str, str], ...]
+    stacked: bool
+
+
+class Composition(Automaton):
+    """Parts that run together, as one automaton.
+
+    The states of the composition are those of its parts, under names ``part.variable``; inputs that nothing is
+    connected to become its inputs. A flow is a flow of all parts. A jump is a jump of one part: where several are
+    enabled at one instant the first part in the order of `parts` jumps first, and the others are then tested again,
+    with the values that the jump gave (rule 6).
+
+    Parameters
+    ----------
+    name : str
+        Name of the composition.
+    parts : mapping
+        Part name -> automaton. The order of the mapping is the order of simultaneous jumps.
+    connections : mapping
+        ``"part.input"`` -> ``"part.output"``, or a sequence of such names for the elements of a vector input.
+    names : mapping, optional
+        ``"part.variable"`` -> name in the composition, where the scoped name is not wanted.
+
+    Raises
+    ------
+    WiringError
+        For unknown names, double names, shapes or units that differ, or a continuous signal on a discrete input.
+    AlgebraicLoopError
+        If outputs need each other without a state in between.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        parts: Mapping[str, Automaton],
+        connections: Mapping[str, Source] | None = None,
+        names: Mapping[str, str] | None = None,
+    ) -> None:
+        self.name = name
+        self.parts = dict(parts)
+        self._wires = {
+            part: {
+                variable: wire for (owner, variable), wire in _wires(self, connections or {}).items() if owner == part
+            }
+            for part in self.parts
+        }
+        self._names = _scoped_names(self, names or {})
+        self.variables = tuple(
+            variable.renamed(self._names[part, variable.name])
+            for part, automaton in self.parts.items()
+            for variable in automaton.variables
+            if variable.name not in self._wires[part]
+        )
+        self._own = {
+            part: [
+                (variable.name, self._names[part, variable.name])
+                for variable in automaton.variables
+                if variable.kind is not Kind.OUTPUT and variable.name not in self._wires[part]
+            ]
+            for part, automaton in self.parts.items()
+        }
+        self._computed = {(p, v.name) for p, automaton in self.parts.items() for v in automaton.of_kind(Kind.OUTPUT)}
+        self._owner = [(part, k) for part, automaton in self.parts.items() for k in range(len(automaton.jumps))]
+        self.jumps = tuple(
+            JumpInfo(f"{part}.{info.name}", info.trigger, info.internal)
+            for part, automaton in self.parts.items()
+            for info in automaton.jumps
+        )
+        self.clocks = tuple(
+            ClockInfo(self._names[part, clock.name], self._owner.index((part, clock.jump)), clock.description)
+            for part, automaton in self.parts.items()
+            for clock in automaton.clocks
+        )
+        self.priority = _common_priority(self)
+        self._refuse_loops()
+
+    @property
+    def has_flow_set(self) -> bool:
+        """Whether some part restricts flow."""
+        return any(part.has_flow_set for part in self.parts.values())
+
+    def start_values(self, s: Values) -> Assignments:
+        """See `Automaton.start_values`; parts in order, so that later parts see the start values of earlier ones."""
+        started: dict[str, Value] = {}
+        values = {name: s[name] for name in ("t", *(v.name for v in self.variables if v.kind is not Kind.OUTPUT))}
+        for part, automaton in self.parts.items():
+            scope = _Scopes(self, Values(self.name, {**values, **started}))
+            started.update(self._scoped(part, automaton.start_values(scope.of(part))))
+        return started
+
+    def derivatives(self, s: Values) -> Assignments:
+        """See `Automaton.derivatives`."""
+        scopes = _Scopes(self, s)
+        rates: dict[str, Value] = {}
+        for part, automaton in self.parts.items():
+            rates.update(self._scoped(part, automaton.derivatives(scopes.of(part))))
+        return rates
+
+    def flow_margin(self, s: Values) -> Value:
+        """See `Automaton.flow_margin`: the intersection of the parts' flow sets."""
+        scopes = _Scopes(self, s)
+        margin: Value = np.inf
+        for part, automaton in self.parts.items():
+            if automaton.has_flow_set:
+                margin = np.minimum(automaton.flow_margin(scopes.of(part)), margin)
+        return margin
+
+    def jump_margins(self, s: Values) -> list[Value]:
+        """See `Automaton.jump_margins`."""
+        scopes = _Scopes(self, s)
+        return [m for part, automaton in self.parts.items() for m in automaton.jump_margins(scopes.of(part))]
+
+    def event_times(self, s: Values) -> list[Value]:
+        """See `Automaton.event_times`."""
+        scopes = _Scopes(self, s)
+        return [time for part, automaton in self.parts.items() for time in automaton.event_times(scopes.of(part))]
+
+    def reset(self, jump: int, s: Values) -> Assignments:
+        """See `Automaton.reset`."""
+        part, index = self._owner[jump]
+        return self._scoped(part, self.parts[part].reset(index, _Scopes(self, s).of(part)))
+
+    def output_values(self, s: Values) -> Assignments:
+        """See `Automaton.output_values`."""
+        scopes = _Scopes(self, s)
+        values: dict[str, Value] = {}
+        for part, automaton in self.parts.items():
+            if automaton.of_kind(Kind.OUTPUT):
+                values.update(self._scoped(part, scopes.outputs(part)))
+        return values
+
+    def name_of(self, part: str, variable: str) -> str:
+        """Return the name that a part's variable has in the composition."""
+        return self._names[part, variable]
+
+    def _scoped(self, part: str, assignments: Assignments) -> dict[str, Value]:
+        return {self._names[part, key]: value for key, value in assignments.items()}
+
+    def _refuse_loops(self) -> None:
+        layout = Layout(self)
+        vectors = [layout.start(kind) for kind in (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)]
+        with np.errstate(all="ignore"):
+            s = layout.values(0.0, *vectors)
+            self.output_values(s)
+            self.derivatives(s)
+
+
+class _Scopes:
+    """The values of each part at one instant, made when they are asked for, wires included."""
+
+    def __init__(self, composition: Composition, s: Values) -> None:
+        self._composition = composition
+        self._s = s
+        self._parts: dict[str, _PartValues] = {}
+        self._outputs: dict[str, Assignments] = {}
+        self._computing: list[str] = []
+
+    def of(self, part: str) -> Values:
+        """Return the values of one part."""
+        if part not in self._parts:
+            s = self._s
+            own: dict[str, Value] = {local: s[name] for local, name in self._composition._own[part]}
+            own["t"] = s["t"]
+            wires = self._composition._wires[part]
+            self._parts[part] = _PartValues(self._composition.parts[part].name, own, self, wires)
+        return self._parts[part]
+
+    def outputs(self, part: str) -> Assignments:
+        """Return the computed outputs of one part."""
+        if part not in self._outputs:
+            if part in self._computing:
+                loop = " -> ".join([*self._computing[self._computing.index(part) :], part])
+                raise AlgebraicLoopError(
+                    f"{self._composition.name}: the outputs of {loop} need each other at one instant: put a state "
+                    "between them, or leave the input out of the outputs."
+                )
+            self._computing.append(part)
+            self._outputs[part] = self._composition.parts[part].output_values(self.of(part))
+            self._computing.pop()
+        return self._outputs[part]
+
+    def wired(self, wire: _Wire) -> Value:
+        """Return the value that arrives over a wire."""
+        values = [self._source(part, variable) for part, variable in wire.sources]
+        return np.stack(values) if wire.stacked else values[0]
+
+    def _source(self, part: str, variable: str) -> Value:
+        if (part, variable) in self._composition._computed:
+            return self.outputs(part)[variable]
+        return self._s[self._composition._names[part, variable]]
+
+
+class _PartValues(Values):
+    """Values of a part; wired inputs are fetched when asked for, so that only real dependencies count as loops."""
+
+    __slots__ = ("_scopes", "_wires")
+
+    def __init__(self, owner: str, values: dict[str, Value], scopes: _Scopes, wires: Mapping[str, _Wire]) -> None:
+        super().__init__(owner, values)
+        self._scopes = scopes
+        self._wires = wires
+
+    def __getitem__(self, name: str) -> Value:
+        if name not in self._values and name in self._wires:
+            self._values[name] = self._scopes.wired(self._wires[name])
+        return super().__getitem__(name)
+
+
+def _wires(composition: Composition, connections: Mapping[str, Source]) -> dict[tuple[str, str], _Wire]:
+    wires = {}
+    for target, source in connections.items():
+        part, variable = _find(composition, target, (Kind.INPUT,), "an input")
+        given = [source] if isinstance(source, str) else list(source)
+        found = [_find(composition, name, (Kind.STATE, Kind.DISCRETE, Kind.OUTPUT), "an output") for name in given]
+        stacked = not isinstance(source, str)
+        if stacked and variable.shape != (len(found),):
+            raise WiringError(
+                f"{composition.name}: {target} has shape {variable.shape}, but {len(found)} signals are connected to "
+                "it: connect one for each element."
+            )
+        for (_, output), name in zip(found, given, strict=True):
+            _require_fit(composition.name, target, variable, name, output, element=stacked)
+        wires[part, variable.name] = _Wire(tuple((owner, output.name) for owner, output in found), stacked)
+    return wires
+
+
+def _find(composition: Composition, scoped: str, kinds: tuple[Kind, ...], what: str) -> tuple[str, Variable]:
+    part = next((p for p in sorted(composition.parts, key=len, reverse=True) if scoped.startswith(p + ".")), None)
+    if part is None:
+        raise WiringError(unknown_name(f"{composition.name} (parts)", scoped, composition.parts))
+    known = {v.name: v for v in composition.parts[part].variables if v.kind in kinds}
+    variable = scoped[len(part) + 1 :]
+    if variable not in known:
+        raise WiringError(f"{composition.name}: {scoped} is not {what}; {part} has {', '.join(known) or 'none'}.")
+    return part, known[variable]
+
+
+def _require_fit(owner: str, target: str, into: Variable, name: str, output: Variable, *, element: bool) -> None:
+    shape = into.shape[1:] if element else into.shape
+    if output.shape != shape:
+        raise WiringError(
+            f"{owner}: {name} has shape {output.shape}, but {target} takes {shape}: connect equal shapes."
+        )
+    if into.unit and output.unit and into.unit != output.unit:
+        raise WiringError(f"{owner}: {name} is in {output.unit!r}, but {target} is in {into.unit!r}: convert one.")
+    if into.discrete and not (output.discrete or output.kind is Kind.DISCRETE):
+        raise WiringError(
+            f"{owner}: {name} changes along flows, but {target} is a discrete input, which may change only at jumps: "
+            "sample it first, or declare the input continuous."
+        )
+
+
+def _scoped_names(composition: Composition, given: Mapping[str, str]) -> dict[tuple[str, str], str]:
+    names = {
+        (part, item): f"{part}.{item}"
+        for part, automaton in composition.parts.items()
+        for item in (*(v.name for v in automaton.variables), *(c.name for c in automaton.clocks))
+    }
+    for scoped, name in given.items():
+        key = next((key for key in names if ".".join(key) == scoped), None)
+        if key is None:
+            raise WiringError(unknown_name(f"{composition.name} (names)", scoped, {".".join(k): k for k in names}))
+        names[key] = name
+    visible: dict[str, Any] = {}
+    for (part, item), name in names.items():
+        if item in composition._wires[part]:
+            continue
+        if name in visible or name == "t":
+            raise WiringError(f"{composition.name}: two variables are called {name!r}: name them apart.")
+        visible[name] = item
+    return names
+
+
+def _common_priority(composition: Composition) -> Priority:
+    priorities = {
+        automaton.priority
+        for automaton in composition.parts.values()
+        if any(info.trigger is Trigger.STATE for info in automaton.jumps)
+    }
+    if len(priorities) > 1:
+        raise WiringError(
+            f"{composition.name}: some parts let the jump win where flow set and jump set overlap and some the flow: "
+            "give all parts with jumps the same priority."
+        )
+    return priorities.pop() if priorities else Priority.JUMP

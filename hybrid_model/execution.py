@@ -1,0 +1,238 @@
+"""One run in progress: the state of an automaton on hybrid time, made to flow and to jump.
+
+`simulate` drives it to an end time; a co-simulation drives it from communication point to communication point.
+The numbered rules are those of docs/semantics.md.
+"""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybrid_model.automaton import Automaton, Priority, Trigger
+from hybrid_model.errors import SimulationError
+from hybrid_model.flow import FlowPiece, integrate
+from hybrid_model.layout import Layout, not_finite
+from hybrid_model.signals import Inputs
+from hybrid_model.solver import Solver
+from hybrid_model.stop import Stop
+from hybrid_model.variables import FloatArray, Kind, Values
+from hybrid_model.zeno import ZenoGuard, ZenoMonitor
+
+
+@dataclass(frozen=True, eq=False)
+class JumpRecord:
+    """One jump of a run.
+
+    Attributes
+    ----------
+    t : float
+        Time in s.
+    j : int
+        Jump count before the jump.
+    index : int
+        Number of the jump among the automaton's jumps.
+    name : str
+        Its name.
+    x_before, z_before, x_after, z_after : ndarray
+        Continuous and discrete states on both sides.
+    """
+
+    t: float
+    j: int
+    index: int
+    name: str
+    x_before: FloatArray
+    z_before: FloatArray
+    x_after: FloatArray
+    z_after: FloatArray
+
+
+class Execution:
+    """The state of a run, and the two things it can do: `flow` and `jump`.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        What runs.
+    t_start : float
+        Start time in s.
+    inputs : Inputs, optional
+        The input vector as a function of time; default: start values.
+    solver : Solver
+        Accuracy.
+    zeno : ZenoGuard
+        What counts as an accumulation of jumps.
+
+    Attributes
+    ----------
+    t, j : float, int
+        Hybrid time.
+    x, z, p : ndarray
+        Continuous states, discrete states, parameters.
+    stopped : Stop or None
+        Set when the run cannot go on; `message` has the particulars.
+    """
+
+    def __init__(
+        self,
+        automaton: Automaton,
+        *,
+        t_start: float = 0.0,
+        inputs: Inputs | None = None,
+        solver: Solver | None = None,
+        zeno: ZenoGuard | None = None,
+    ) -> None:
+        if not math.isfinite(t_start):
+            raise SimulationError(f"the start time of {automaton.name} is {t_start}: give a finite number.")
+        self.automaton = automaton
+        self.layout = Layout(automaton)
+        self.inputs = inputs or Inputs(self.layout)
+        self.solver = solver or Solver()
+        self.monitor = ZenoMonitor(zeno or ZenoGuard())
+        self.t = float(t_start)
+        self.j = 0
+        self.x = self.layout.start(Kind.STATE)
+        self.z = self.layout.start(Kind.DISCRETE)
+        self.p = self.layout.start(Kind.PARAMETER)
+        self.stopped: Stop | None = None
+        self.message = ""
+        self.next_step: float | None = None
+        self._left_flow_set = False
+        self.compute_start()
+
+    def compute_start(self) -> None:
+        """Give the computed states their start values, from parameters, inputs and the other states."""
+        start = self.automaton.start_values(self.values())
+        self.x = self.layout.pack(Kind.STATE, start, self.x)
+        self.z = self.layout.pack(Kind.DISCRETE, start, self.z)
+        self._require_finite("at the start")
+
+    def values(self) -> Values:
+        """Return all values at the present hybrid time, by name."""
+        return self.values_at(self.t, self.x)
+
+    def values_at(self, t: float, x: FloatArray) -> Values:
+        """Return all values at another point of the present flow."""
+        return self.layout.values(t, x, self.z, self.inputs.at(t), self.p)
+
+    def copy(self) -> Execution:
+        """Return an independent copy: what happens to it does not happen here."""
+        other = copy.copy(self)
+        other.inputs = self.inputs.copy()
+        other.monitor = copy.deepcopy(self.monitor)
+        other.x, other.z, other.p = self.x.copy(), self.z.copy(), self.p.copy()
+        return other
+
+    # Jumps.
+
+    def due(self) -> int | None:
+        """Return the number of the first jump enabled now, in the automaton's fixed order (rules 2, 3 and 6)."""
+        if not self.automaton.jumps:
+            return None
+        s = self.values()
+        with np.errstate(all="ignore"):
+            margins = iter(self.automaton.jump_margins(s))
+            times = iter(self.automaton.event_times(s))
+        may_jump = self.automaton.priority is Priority.JUMP or self._left_flow_set or not self.in_flow_set(0.0)
+        for index, info in enumerate(self.automaton.jumps):
+            if info.trigger is Trigger.STATE:
+                if next(margins) >= 0.0 and may_jump:
+                    return index
+            elif next(times) <= self.t:
+                return index
+        return None
+
+    def jump(self, index: int) -> JumpRecord:
+        """Take a jump: reset states at the same t, advance j.
+
+        Raises
+        ------
+        SimulationError
+            If a new value is not finite, or a time event does not move on.
+        """
+        info = self.automaton.jumps[index]
+        before = self.values()
+        with np.errstate(all="ignore"):
+            new = self.automaton.reset(index, before)
+        x, z = self.x, self.z
+        self.x = self.layout.pack(Kind.STATE, new, x)
+        self.z = self.layout.pack(Kind.DISCRETE, new, z)
+        self._require_finite(f"after jump {info.name!r} at t = {self.t:.9g} s")
+        record = JumpRecord(self.t, self.j, index, info.name, x, z, self.x, self.z)
+        self.j += 1
+        self._left_flow_set = False
+        if info.trigger is Trigger.TIME:
+            self._require_progress(index, before)
+        else:
+            message = self.monitor.record(self.automaton.name, info.name, self.t)
+            if message:
+                self.stopped, self.message = Stop.ZENO, message
+        return record
+
+    def in_flow_set(self, tolerance: float) -> bool:
+        """Whether the state lies in the flow set, or outside by no more than `tolerance`."""
+        return not self.automaton.has_flow_set or bool(self.automaton.flow_margin(self.values()) >= -tolerance)
+
+    # Flow.
+
+    def next_time_event(self) -> float:
+        """Return the earliest known time, in s, at which a time event or an input's breakpoint comes."""
+        s = self.values()
+        times = [float(time) for time in self.automaton.event_times(s)]
+        return min([*times, self.inputs.next_breakpoint(self.t)])
+
+    def flow(self, limit: float) -> list[FlowPiece]:
+        """Flow to the first event or to `limit`, whichever comes first, and never across a time event (rule 5).
+
+        Parameters
+        ----------
+        limit : float
+            Time in s, not before the present.
+
+        Returns
+        -------
+        list of FlowPiece
+            What was flown, step by step.
+
+        Raises
+        ------
+        SimulationError
+            If the flow map gives values that are not finite, or the solver cannot go on.
+        """
+        if not self.in_flow_set(self.solver.event_tolerance):
+            self._block("the state is in neither the flow set nor the jump set")
+            return []
+        pieces, left = integrate(self, min(limit, self.next_time_event()))
+        self._left_flow_set = left
+        if left and self.due() is None:
+            self._block("the flow left the flow set, and the state is not in the jump set")
+        return pieces
+
+    def _block(self, what: str) -> None:
+        self.stopped = Stop.BLOCKED
+        state = self.layout.describe({Kind.STATE: self.x, Kind.DISCRETE: self.z})
+        margin = float(self.automaton.flow_margin(self.values()))
+        self.message = (
+            f"{self.automaton.name}: {what} at t = {self.t:.9g} s: {state}; margin of the flow set {margin:.3g}. "
+            "Enlarge one of the sets, or make the jump map land in their union."
+        )
+
+    def _require_finite(self, when: str) -> None:
+        bad = not_finite(self.layout.names(Kind.STATE), self.x) or not_finite(self.layout.names(Kind.DISCRETE), self.z)
+        if bad:
+            raise SimulationError(f"{self.automaton.name}: {bad} {when}: states must stay finite numbers.")
+
+    def _require_progress(self, index: int, before: Values) -> None:
+        infos = self.automaton.jumps
+        at = sum(info.trigger is Trigger.TIME for info in infos[:index])
+        was = self.automaton.event_times(before)[at]
+        now = self.automaton.event_times(self.values())[at]
+        if not now > was:
+            raise SimulationError(
+                f"{self.automaton.name}: time event {infos[index].name!r} was due at {float(was):.9g} s and after its "
+                f"jump is due at {float(now):.9g} s: its jump map must move its time on."
+            )

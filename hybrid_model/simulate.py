@@ -1,0 +1,74 @@
+"""Run an automaton: alternate jumps and flows until the end time or until it cannot go on."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from hybrid_model.arc import FlowRecord, HybridArc
+from hybrid_model.automaton import Automaton
+from hybrid_model.errors import SimulationError
+from hybrid_model.execution import Execution, JumpRecord
+from hybrid_model.layout import Layout
+from hybrid_model.signals import Inputs, InputValue
+from hybrid_model.solver import Solver
+from hybrid_model.stop import Stop
+from hybrid_model.zeno import ZenoGuard
+
+
+def simulate(
+    automaton: Automaton,
+    t_end: float,
+    *,
+    t_start: float = 0.0,
+    inputs: Mapping[str, InputValue] | None = None,
+    solver: Solver | None = None,
+    zeno: ZenoGuard | None = None,
+) -> HybridArc:
+    """Run an automaton from its start values.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        What runs.
+    t_end : float
+        End time in s; jumps due at it are taken.
+    t_start : float
+        Start time in s.
+    inputs : mapping, optional
+        Input name -> number, array, function of time, or `Signal`.
+    solver : Solver, optional
+        Method and accuracy.
+    zeno : ZenoGuard, optional
+        What counts as an accumulation of jumps.
+
+    Returns
+    -------
+    HybridArc
+        The run on hybrid time; its `stop` and `message` say how it ended.
+
+    Raises
+    ------
+    SimulationError
+        For times that are not finite or reversed, and for values that do not stay finite.
+    """
+    if not (math.isfinite(t_end) and t_end >= t_start):
+        raise SimulationError(
+            f"the end time is {t_end} s and the start {t_start} s: give a finite end after the start."
+        )
+    execution = Execution(
+        automaton, t_start=t_start, inputs=Inputs(Layout(automaton), inputs), solver=solver, zeno=zeno
+    )
+    flows = [FlowRecord(execution.t, execution.x, execution.z, ())]
+    jumps: list[JumpRecord] = []
+    while execution.stopped is None:
+        index = execution.due()
+        if index is not None:
+            jumps.append(execution.jump(index))
+            flows.append(FlowRecord(execution.t, execution.x, execution.z, ()))
+        elif execution.t >= t_end:
+            execution.stopped, execution.message = Stop.HORIZON, f"{automaton.name}: reached t = {t_end:.9g} s."
+        else:
+            pieces = execution.flow(t_end)
+            flows[-1] = flows[-1].extended(pieces)
+    return HybridArc(execution, flows, jumps)

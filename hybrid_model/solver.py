@@ -1,0 +1,59 @@
+"""How flows are integrated and events located: the options of a run."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
+
+from hybrid_model.errors import SimulationError
+
+
+class Method(enum.Enum):
+    """SciPy's steppers; the value is the class."""
+
+    DOP853 = DOP853
+    RK45 = RK45
+    RADAU = Radau
+    BDF = BDF
+    LSODA = LSODA
+
+
+@dataclass(frozen=True)
+class Solver:
+    """Accuracy of a run.
+
+    Attributes
+    ----------
+    method : Method
+        Stepper; Radau, BDF and LSODA for stiff flows.
+    rtol, atol : float
+        Relative and absolute tolerance of a step, as in SciPy.
+    max_step : float
+        Longest step in s.
+    scan_points : int
+        Interior samples of every margin in a step; see `hybrid_model.locate` for what that bounds.
+    event_tolerance : float
+        In s: crossings closer than this are taken at one instant, in the fixed order of the jumps. The same number, in
+        the margin's unit, is how far outside the flow set rounding may leave a state.
+
+    Raises
+    ------
+    SimulationError
+        If a number is not positive.
+    """
+
+    method: Method = Method.DOP853
+    rtol: float = 1e-12
+    atol: float = 1e-14
+    max_step: float = math.inf
+    scan_points: int = 8
+    event_tolerance: float = 1e-9
+
+    def __post_init__(self) -> None:
+        for name in ("rtol", "atol", "max_step", "scan_points", "event_tolerance"):
+            value = getattr(self, name)
+            if not value > 0:
+                raise SimulationError(f"solver option {name} = {value}: give a positive number.")
