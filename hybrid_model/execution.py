@@ -212,6 +212,16 @@ class Execution:
             self._block("the flow left the flow set, and the state is not in the jump set")
         return pieces
 
+    def drift(self, t: float) -> None:
+        """Move on by no more than the event tolerance with the present derivative, although a jump is due.
+
+        Simultaneous events of other parts are handled at the latest of their times (rule 6).
+        """
+        if t > self.t:
+            rates = self.layout.pack(Kind.STATE, self.automaton.derivatives(self.values()))
+            self.x = self.x + (t - self.t) * rates
+            self.t = t
+
     def _block(self, what: str) -> None:
         self.stopped = Stop.BLOCKED
         state = self.layout.describe({Kind.STATE: self.x, Kind.DISCRETE: self.z})

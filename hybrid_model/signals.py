@@ -83,6 +83,14 @@ class Inputs:
         self._held[place.at] = given.ravel() if given.shape else given
         return not np.array_equal(before, self._held[place.at])
 
+    def hold_element(self, index: int, value: float) -> bool:
+        """Set one scalar of u to a constant; return whether that changed it."""
+        changed = bool(self._held[index] != value)
+        if changed:
+            self._held = self._held.copy()
+            self._held[index] = value
+        return changed
+
     @property
     def names(self) -> list[str]:
         """Names of the inputs."""

@@ -1,0 +1,1 @@
+"""Co-simulation: slaves (FMUs and automata behind one interface) and the masters that run them together."""

@@ -1,0 +1,182 @@
+"""An FMI 3.0 Co-Simulation FMU behind the slave interface, over fmpy."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fmpy import extract, read_model_description
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Slave
+
+from cosim.errors import CosimError
+from cosim.slave import Port, Slave, Step, Update
+
+
+class FmuSlave(Slave):
+    """An FMU that a master steps.
+
+    Loading an FMU runs its native code in this process: load only FMUs that you trust.
+
+    Parameters
+    ----------
+    name : str
+        Name in the system.
+    path : str or Path
+        The FMU.
+
+    Raises
+    ------
+    CosimError
+        If the file is not an FMI 3.0 Co-Simulation FMU with a binary for this machine.
+    """
+
+    def __init__(self, name: str, path: str | Path) -> None:
+        try:
+            description = read_model_description(str(path))
+        except Exception as error:
+            raise CosimError(f"{name}: {path} cannot be read as an FMU: {error}") from error
+        if not description.fmiVersion.startswith("3.") or description.coSimulation is None:
+            raise CosimError(
+                f"{name}: {path} is not an FMI 3.0 Co-Simulation FMU (it says FMI {description.fmiVersion}): "
+                "export it as one."
+            )
+        self._variables = {variable.name: variable for variable in description.modelVariables}
+        scalars = [v for v in description.modelVariables if v.type != "Clock"]
+        super().__init__(
+            name,
+            [_port(v) for v in scalars if v.causality == "input"],
+            [_port(v) for v in scalars if v.causality == "output"],
+            [v.name for v in description.modelVariables if v.type == "Clock" and v.causality == "output"],
+        )
+        self.has_event_mode = bool(description.coSimulation.hasEventMode)
+        self.can_restore = bool(description.coSimulation.canGetAndSetFMUState)
+        self._clock_references = [self._variables[clock].valueReference for clock in self.clocks]
+        self._messages: list[str] = []
+        self._token = description.instantiationToken
+        self._identifier = description.coSimulation.modelIdentifier
+        self._path = str(path)
+        self._folder: str | None = None
+        self._fmu: FMU3Slave | None = None
+        self._starts: dict[str, float] = {}
+        self._getters: dict[str, tuple[Callable[[list[int]], list[Any]], list[int]]] = {}
+
+    def set(self, name: str, value: float) -> None:
+        """See `Slave.set`."""
+        if name not in self._variables:
+            raise self.unknown(name)
+        if self._fmu is None:
+            self._starts[name] = value
+        else:
+            self._write(name, value)
+
+    def get(self, name: str) -> float:
+        """See `Slave.get`."""
+        if name not in self._getters:
+            if name not in self._variables:
+                raise self.unknown(name)
+            variable = self._variables[name]
+            self._getters[name] = getattr(self._instance, f"get{variable.type}"), [variable.valueReference]
+        getter, reference = self._getters[name]
+        return float(self._call(getter, reference)[0])
+
+    def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
+        """See `Slave.start`."""
+        if events and not self.has_event_mode:
+            raise CosimError(f"{self.name} has no event mode: use the fixed-step master.")
+        self._events = events
+        self._folder = extract(self._path)
+        self._fmu = FMU3Slave(
+            guid=self._token,
+            unzipDirectory=self._folder,
+            modelIdentifier=self._identifier,
+            instanceName=self.name,
+        )
+        try:
+            self._fmu.instantiate(eventModeUsed=events, earlyReturnAllowed=events, logMessage=self._log)
+        except Exception as error:
+            self._fmu = None
+            raise CosimError(f"{self.name} refuses to be instantiated: {self._said()}") from error
+        for name, value in self._starts.items():
+            self._write(name, value)
+        self._call(self._fmu.enterInitializationMode, startTime=t_start, stopTime=t_stop)
+
+    def begin(self) -> None:
+        """See `Slave.begin`."""
+        self._call(self._instance.exitInitializationMode)
+
+    def enter_event_mode(self) -> None:
+        """See `Slave.enter_event_mode`."""
+        self._call(self._instance.enterEventMode)
+
+    def enter_step_mode(self) -> None:
+        """See `Slave.enter_step_mode`."""
+        self._call(self._instance.enterStepMode)
+
+    def update(self) -> Update:
+        """See `Slave.update`."""
+        ticks = self._ticks()
+        again, terminate, _, _, defined, time = self._call(self._instance.updateDiscreteStates)
+        return Update(again, ticks, time if defined else None, self._said() if terminate else "")
+
+    def step(self, t: float, t_next: float) -> Step:
+        """See `Slave.step`."""
+        event, terminate, _, reached = self._call(self._instance.doStep, t, t_next - t)
+        return Step(reached, event, self._said() if terminate else "")
+
+    def save(self) -> Any:
+        """See `Slave.save`."""
+        return self._call(self._instance.getFMUState)
+
+    def restore(self, state: Any) -> None:
+        """See `Slave.restore`."""
+        self._call(self._instance.setFMUState, state)
+
+    def release(self, state: Any) -> None:
+        """See `Slave.release`."""
+        self._call(self._instance.freeFMUState, state)
+
+    def close(self) -> None:
+        """See `Slave.close`."""
+        if self._fmu is not None:
+            self._fmu.freeInstance()
+            self._fmu = None
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder = None
+        self._getters.clear()
+
+    @property
+    def _instance(self) -> FMU3Slave:
+        if self._fmu is None:
+            raise CosimError(f"{self.name} has not been started: call start first.")
+        return self._fmu
+
+    def _ticks(self) -> tuple[str, ...]:
+        if not self.clocks:
+            return ()
+        active = self._call(self._instance.getClock, self._clock_references)
+        return tuple(clock for clock, ticked in zip(self.clocks, active, strict=True) if ticked)
+
+    def _write(self, name: str, value: float) -> None:
+        variable = self._variables[name]
+        number = float(value) if variable.type.startswith("Float") else round(value)
+        self._call(getattr(self._instance, f"set{variable.type}"), [variable.valueReference], [number])
+
+    def _call(self, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+        try:
+            return function(*arguments, **named)
+        except FMICallException as error:
+            raise CosimError(f"{self.name}: {error.function} failed: {self._said()}") from error
+
+    def _log(self, environment: Any, status: int, category: bytes | None, message: bytes) -> None:
+        self._messages.append(message.decode("utf-8", "replace"))
+
+    def _said(self) -> str:
+        return self._messages[-1] if self._messages else "the FMU logged no message"
+
+
+def _port(variable: Any) -> Port:
+    return Port(variable.name, variable.unit or "", variable.variability == "discrete")

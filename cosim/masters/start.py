@@ -1,0 +1,71 @@
+"""What all masters do alike: start the slaves, transfer start values, read outputs at the end."""
+
+from __future__ import annotations
+
+import math
+
+from cosim.errors import CosimError
+from cosim.result import CosimResult
+from cosim.system import System
+
+
+def require_times(t_start: float, t_stop: float, interval: float | None, what: str) -> None:
+    """Refuse times that are not finite, not in order, or a step that is not positive.
+
+    Raises
+    ------
+    CosimError
+        With the value and the rule.
+    """
+    if not (math.isfinite(t_start) and math.isfinite(t_stop) and t_stop > t_start):
+        raise CosimError(f"the run goes from {t_start} to {t_stop} s: give finite times, the stop after the start.")
+    if interval is not None and not (math.isfinite(interval) and interval > 0):
+        raise CosimError(f"the {what} is {interval} s: give a positive, finite number.")
+
+
+def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool) -> None:
+    """Bring all slaves through initialization mode, start values transferred along the connections.
+
+    Raises
+    ------
+    CosimError
+        If the start values do not settle: then they depend on each other in a loop.
+    """
+    for slave in system.slaves.values():
+        slave.start(t_start, t_stop, events=events)
+    known: dict[tuple[str, str], float] = {}
+    # A chain of n slaves needs n rounds, and one more to see that nothing changes.
+    for _ in range(len(system.slaves) + 1):
+        changed = [
+            c for c in system.connections if transfer_start(system, c.target, c.input, c.source, c.output, known)
+        ]
+        if not changed:
+            break
+    else:
+        raise CosimError(f"the start values do not settle: {changed[0]} and others form a loop. Break it by a state.")
+    for slave in system.slaves.values():
+        slave.begin()
+
+
+def transfer_start(
+    system: System, target: str, input_: str, source: str, output: str, known: dict[tuple[str, str], float]
+) -> bool:
+    """Transfer one start value; return whether it was news to the input."""
+    value = system.slaves[source].get(output)
+    if known.get((target, input_)) == value:
+        return False
+    known[target, input_] = value
+    system.slaves[target].set(input_, value)
+    return True
+
+
+def sample(system: System, result: CosimResult, t: float) -> None:
+    """Append all outputs at `t` to the result."""
+    result.times.append(t)
+    for name, value in outputs(system).items():
+        result.signals.setdefault(name, []).append(value)
+
+
+def outputs(system: System) -> dict[str, float]:
+    """Return all outputs by ``slave.output``."""
+    return {f"{name}.{port}": slave.get(port) for name, slave in system.slaves.items() for port in slave.outputs}

@@ -1,0 +1,59 @@
+"""What a co-simulation gives."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+
+class Ended(enum.Enum):
+    """Why a co-simulation ended; the value is the remedy."""
+
+    HORIZON = "The stop time was reached."
+    TERMINATED = "A slave ended the run: its message says why and what to change."
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A tick of an output clock: `slave`'s `clock` at `t` in s."""
+
+    t: float
+    slave: str
+    clock: str
+
+
+@dataclass
+class CosimResult:
+    """A co-simulation's events and signals.
+
+    Attributes
+    ----------
+    ended : Ended
+        Why it ended; `message` has the particulars.
+    t : float
+        Time in s at which it ended.
+    ticks : list of Tick
+        Ticks of output clocks, in order.
+    times, signals : list of float, dict
+        Output times in s, and the outputs there by ``slave.output``.
+    final : dict
+        Outputs at the end by ``slave.output``.
+    steps : int
+        Steps made by all slaves together.
+    """
+
+    ended: Ended = Ended.HORIZON
+    message: str = ""
+    t: float = 0.0
+    ticks: list[Tick] = field(default_factory=list)
+    times: list[float] = field(default_factory=list)
+    signals: dict[str, list[float]] = field(default_factory=dict)
+    final: dict[str, float] = field(default_factory=dict)
+    steps: int = 0
+
+    def tick_times(self, slave: str, clock: str) -> npt.NDArray[np.float64]:
+        """Return the times in s at which a clock ticked."""
+        return np.array([tick.t for tick in self.ticks if tick.slave == slave and tick.clock == clock])

@@ -1,0 +1,82 @@
+"""A system of slaves wired by name, checked before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from cosim.errors import MisfitError
+from cosim.slave import Port, Slave
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A scalar signal from an output to an input."""
+
+    source: str
+    output: str
+    target: str
+    input: str
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.output} -> {self.target}.{self.input}"
+
+
+class System:
+    """Slaves and their connections.
+
+    Parameters
+    ----------
+    slaves : sequence of Slave
+        With distinct names; the order is the order in which simultaneous events are handled.
+    connections : mapping
+        ``"slave.input"`` -> ``"slave.output"``; inputs not named keep their start values.
+
+    Raises
+    ------
+    MisfitError
+        For unknown names, two slaves of one name, units that differ, or a continuous signal on a discrete input.
+    """
+
+    def __init__(self, slaves: Sequence[Slave], connections: Mapping[str, str]) -> None:
+        self.slaves = {slave.name: slave for slave in slaves}
+        if len(self.slaves) < len(slaves):
+            raise MisfitError(f"two slaves have one name among {[slave.name for slave in slaves]}: name them apart.")
+        self.connections = tuple(self._connection(target, source) for target, source in connections.items())
+        self._from: dict[str, list[Connection]] = {name: [] for name in self.slaves}
+        for connection in self.connections:
+            self._from[connection.source].append(connection)
+
+    def from_slave(self, name: str) -> list[Connection]:
+        """Return the connections that start at a slave."""
+        return self._from[name]
+
+    def close(self) -> None:
+        """Free everything the slaves hold."""
+        for slave in self.slaves.values():
+            slave.close()
+
+    def _connection(self, target: str, source: str) -> Connection:
+        into, input_port = self._find(target, "input")
+        out_of, output_port = self._find(source, "output")
+        if input_port.unit and output_port.unit and input_port.unit != output_port.unit:
+            raise MisfitError(
+                f"{source} is in {output_port.unit!r}, but {target} is in {input_port.unit!r}: convert one."
+            )
+        if input_port.discrete and not output_port.discrete:
+            raise MisfitError(
+                f"{source} changes along flows, but {target} is a discrete input, which may change only at events: "
+                "sample the signal first."
+            )
+        return Connection(out_of.name, output_port.name, into.name, input_port.name)
+
+    def _find(self, scoped: str, what: str) -> tuple[Slave, Port]:
+        owner = next((n for n in sorted(self.slaves, key=len, reverse=True) if scoped.startswith(n + ".")), None)
+        if owner is None:
+            raise MisfitError(f"{scoped!r} names no slave; the slaves are {', '.join(self.slaves)}.")
+        slave = self.slaves[owner]
+        ports = slave.inputs if what == "input" else slave.outputs
+        name = scoped[len(owner) + 1 :]
+        if name not in ports:
+            raise MisfitError(f"{scoped} is not an {what}; the {what}s of {owner} are {', '.join(ports) or 'none'}.")
+        return slave, ports[name]

@@ -1,0 +1,131 @@
+"""Generate model.c: the traced functions and the tables that the engine reads (fmu/runtime/model.h)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import casadi as ca
+import numpy as np
+
+from fmu.trace import Trace
+from fmu.variables import Bank, FmuVariable
+from hybrid_model.automaton import Priority, Trigger
+from hybrid_model.variables import Kind
+
+_OPTIONS = {
+    "with_header": False,
+    "with_export": False,
+    "cpp": False,
+    "main": False,
+    "mex": False,
+    "verbose": False,
+    "casadi_real": "double",
+    "casadi_int": "long long int",
+}
+
+
+def model_code(traced: Trace, variables: Sequence[FmuVariable], token: str) -> str:
+    """Return the C source of a model.
+
+    Parameters
+    ----------
+    traced : Trace
+        The automaton's maps.
+    variables : sequence of FmuVariable
+        In the order of their value references.
+    token : str
+        Instantiation token.
+
+    Returns
+    -------
+    str
+        A C99 translation unit that defines ``const Model model``.
+    """
+    generator = ca.CodeGenerator("model", _OPTIONS)
+    for function in traced.functions:
+        generator.add(function)
+    return "\n".join(
+        [generator.dump(), '#include "model.h"', "", *_tables(traced, variables), _model(traced, variables, token)]
+    )
+
+
+def string(text: str) -> str:
+    """Return `text` as a C string literal of plain ASCII, whatever it contains."""
+    octets = "".join(
+        chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode("utf-8")
+    )
+    return f'"{octets}"'
+
+
+def _number(value: float) -> str:
+    return float(value).hex() if np.isfinite(value) else str(value)
+
+
+def _array(kind: str, name: str, items: Iterable[str]) -> str:
+    # C has no empty arrays: a table without entries gets one that is never read.
+    entries = list(items) or ["0" if "char" in kind or "size_t" in kind or "double" in kind else "{0}"]
+    return f"static const {kind}{name}[] = {{\n    " + ",\n    ".join(entries) + "\n};\n"
+
+
+def _tables(traced: Trace, variables: Sequence[FmuVariable]) -> list[str]:
+    automaton, layout = traced.automaton, traced.layout
+    starts = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
+    margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
+    return [
+        *(_array("double ", f"start_{name}", map(_number, layout.start(kind))) for name, kind in starts),
+        _array("char *const ", "state_names", map(string, layout.names(Kind.STATE))),
+        _array("char *const ", "discrete_names", map(string, layout.names(Kind.DISCRETE))),
+        _array("char *const ", "margin_names", map(string, margin_names)),
+        _array("ModelJump ", "jumps", _jumps(traced)),
+        _array("size_t ", "clock_jump", (str(clock.jump) for clock in automaton.clocks)),
+        _array("ModelVariable ", "variables", map(_variable, variables)),
+    ]
+
+
+def _jumps(traced: Trace) -> list[str]:
+    rows = []
+    counts = {Trigger.STATE: 0, Trigger.TIME: 0}
+    for number, info in enumerate(traced.automaton.jumps):
+        kind = "JUMP_ON_STATE" if info.trigger is Trigger.STATE else "JUMP_ON_TIME"
+        internal = "true" if info.internal else "false"
+        rows.append(f"{{{string(info.name)}, {kind}, {counts[info.trigger]}, {internal}, hybrid_reset{number}}}")
+        counts[info.trigger] += 1
+    return rows
+
+
+def _variable(variable: FmuVariable) -> str:
+    flags = ", ".join("true" if flag else "false" for flag in (variable.discrete, variable.calculated))
+    return f"{{{string(variable.name)}, {variable.type.value}, {variable.bank.value}, {variable.index}, {flags}}}"
+
+
+def _model(traced: Trace, variables: Sequence[FmuVariable], token: str) -> str:
+    automaton, sizes = traced.automaton, traced.layout.sizes
+    work = [max(getattr(f, size)() for f in traced.functions) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
+    predictable = all(v.discrete for v in variables if v.bank is Bank.INPUT)
+    fields = {
+        "name": string(automaton.name),
+        "token": string(token),
+        "n_states": sizes[Kind.STATE],
+        "n_discrete": sizes[Kind.DISCRETE],
+        "n_inputs": sizes[Kind.INPUT],
+        "n_parameters": sizes[Kind.PARAMETER],
+        "n_outputs": sizes[Kind.OUTPUT],
+        "n_margins": sum(info.trigger is Trigger.STATE for info in automaton.jumps),
+        "n_times": sum(info.trigger is Trigger.TIME for info in automaton.jumps),
+        "n_jumps": len(automaton.jumps),
+        "n_clocks": len(automaton.clocks),
+        "n_variables": len(variables),
+        **dict(zip(("n_arg", "n_res", "n_iw", "n_w"), work, strict=True)),
+        "flow_priority": _bool(automaton.priority is Priority.FLOW),
+        "has_flow_set": _bool(automaton.has_flow_set),
+        "predictable": _bool(predictable),
+        **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
+        **{name: f"hybrid_{name}" for name in ("start", "flow", "flow_set", "margins", "times", "outputs")},
+        **{name: name for name in ("jumps", "clock_jump", "variables")},
+        **{name: name for name in ("state_names", "discrete_names", "margin_names")},
+    }
+    return "const Model model = {\n" + "".join(f"    .{key} = {value},\n" for key, value in fields.items()) + "};\n"
+
+
+def _bool(value: bool) -> str:
+    return "true" if value else "false"

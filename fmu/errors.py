@@ -1,0 +1,9 @@
+"""What goes wrong in exporting, by kind; each message names the thing, the value, the rule and the remedy."""
+
+
+class ExportError(RuntimeError):
+    """An automaton cannot become an FMU as it is."""
+
+
+class TraceError(ExportError, TypeError):
+    """A map cannot be traced: it does with a value what only a number allows."""

@@ -1,0 +1,195 @@
+"""Trace an automaton: call its maps once with symbols and keep the expressions as functions.
+
+Every function has the inputs t, x, z, u, p (see fmu/runtime/model.h); nothing of the model is written again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from fmu.errors import TraceError
+from fmu.symbols import expressions, symbol_vector, symbols
+from hybrid_model import Automaton, Values
+from hybrid_model.automaton import Assignments, Trigger
+from hybrid_model.layout import Layout
+from hybrid_model.variables import Kind
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """An automaton as functions of (t, x, z, u, p).
+
+    Attributes
+    ----------
+    automaton : Automaton
+        What was traced.
+    layout : Layout
+        Where each variable lives in x, z, u, p and y.
+    start, flow, flow_set, margins, times, outputs : casadi.Function
+        See fmu/runtime/model.h.
+    resets : tuple of casadi.Function
+        One a jump, in the order of the automaton's jumps; results x+ and z+.
+    """
+
+    automaton: Automaton
+    layout: Layout
+    start: ca.Function
+    flow: ca.Function
+    flow_set: ca.Function
+    margins: ca.Function
+    times: ca.Function
+    outputs: ca.Function
+    resets: tuple[ca.Function, ...]
+
+    @property
+    def functions(self) -> tuple[ca.Function, ...]:
+        """All functions, in a fixed order."""
+        return (self.start, self.flow, self.flow_set, self.margins, self.times, self.outputs, *self.resets)
+
+
+def trace(automaton: Automaton) -> Trace:
+    """Trace the maps of an automaton.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        With maps written in numpy style.
+
+    Returns
+    -------
+    Trace
+        The maps as CasADi functions.
+
+    Raises
+    ------
+    TraceError
+        If a map does with a value what only a number allows, if the time of a time event depends on anything but
+        parameters and discrete states, or if an internal event depends on or changes more than those.
+    """
+    return _Tracer(automaton).trace()
+
+
+class _Tracer:
+    def __init__(self, automaton: Automaton) -> None:
+        # Scalars that leave an array by a path of numpy's own meet numpy functions as bare CasADi values.
+        ca.GlobalOptions.setNumpyMode(-1)
+        self.automaton = automaton
+        self.layout = Layout(automaton)
+        kinds = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
+        self.t = ca.SX.sym("t")
+        self.vectors = {kind: ca.SX.sym(kind.name.lower(), self.layout.sizes[kind]) for kind in kinds}
+        self.arguments = [self.t, *self.vectors.values()]
+        self.arrays = {kind: symbol_vector(vector) for kind, vector in self.vectors.items()}
+
+    def trace(self) -> Trace:
+        automaton = self.automaton
+        traced = Trace(
+            automaton,
+            self.layout,
+            start=self._function("start", *self._new_states(automaton.start_values, "start_map")),
+            flow=self._function("flow", self._assigned(Kind.STATE, self._call(automaton.derivatives, "flow_map"))),
+            flow_set=self._function("flow_set", self._scalars([self._flow_margin()], "the flow set")),
+            margins=self._function(
+                "margins", self._scalars(self._call(automaton.jump_margins, "a jump set"), "a jump set")
+            ),
+            times=self._function("times", self._times()),
+            outputs=self._function(
+                "outputs", self._assigned(Kind.OUTPUT, self._call(automaton.output_values, "outputs"))
+            ),
+            resets=tuple(self._reset(k) for k in range(len(automaton.jumps))),
+        )
+        return traced
+
+    def _values(self) -> Values:
+        return self.layout.values(symbols(self.t), *self.arrays.values())
+
+    def _call(self, method: Callable[[Values], Any], what: str) -> Any:
+        try:
+            return method(self._values())
+        except (TraceError, RuntimeError, TypeError) as error:
+            raise TraceError(f"{what} of {self.automaton.name} cannot be traced: {error}") from error
+
+    def _flow_margin(self) -> Any:
+        if not self.automaton.has_flow_set:
+            return 1.0
+        return self._call(self.automaton.flow_margin, "flow_set")
+
+    def _new_states(self, method: Callable[[Values], Assignments], what: str) -> tuple[ca.SX, ca.SX]:
+        new = self._call(method, what)
+        return self._assigned(Kind.STATE, new, keep=True), self._assigned(Kind.DISCRETE, new, keep=True)
+
+    def _assigned(self, kind: Kind, assignments: Assignments, *, keep: bool = False) -> ca.SX:
+        elements: list[ca.SX] = []
+        for place in self.layout.places[kind]:
+            name, size = place.variable.name, place.variable.size
+            if name in assignments:
+                given = expressions(assignments[name])
+                given = given * size if len(given) == 1 else given
+            elif keep:
+                given = expressions(self.arrays[kind][place.at])
+            else:
+                raise TraceError(f"{self.automaton.name} gives no value to {name}.")
+            if len(given) != size:
+                raise TraceError(
+                    f"{self.automaton.name}: {name} has {size} elements, but the value computed has {len(given)}."
+                )
+            elements += given
+        return ca.vertcat(*elements) if elements else ca.SX(0, 1)
+
+    def _scalars(self, margins: list[Any], what: str) -> ca.SX:
+        elements = []
+        for margin in margins:
+            given = expressions(margin)
+            if len(given) != 1:
+                raise TraceError(
+                    f"{what} of {self.automaton.name} has {len(given)} margins: join them to one number by least "
+                    "(intersection) or greatest (union)."
+                )
+            elements += given
+        return ca.vertcat(*elements) if elements else ca.SX(0, 1)
+
+    def _times(self) -> ca.SX:
+        times = self._scalars(self._call(self.automaton.event_times, "an event's time"), "an event's time")
+        free = ca.vertcat(self.t, self.vectors[Kind.STATE], self.vectors[Kind.INPUT])
+        if times.numel() and ca.depends_on(times, free):
+            names = [info.name for info in self.automaton.jumps if info.trigger is Trigger.TIME]
+            raise TraceError(
+                f"{self.automaton.name}: the time of an event ({', '.join(names)}) depends on the time, a continuous "
+                "state or an input: a known time comes from parameters and discrete states; use a jump set otherwise."
+            )
+        return times
+
+    def _reset(self, index: int) -> ca.Function:
+        info = self.automaton.jumps[index]
+        x, z = self._new_states(lambda s: self.automaton.reset(index, s), f"the jump map of {info.name!r}")
+        if info.internal:
+            outside = ca.vertcat(self.vectors[Kind.STATE], self.vectors[Kind.INPUT])
+            changes_x = x.numel() and not ca.is_equal(x, self.vectors[Kind.STATE], 2)
+            if changes_x or (z.numel() and ca.depends_on(z, outside)):
+                raise TraceError(
+                    f"{self.automaton.name}: the internal event {info.name!r} uses or changes a continuous state or an "
+                    "input: only events that are not internal may."
+                )
+        return self._function(f"reset{index}", x, z)
+
+    def _function(self, name: str, *results: ca.SX) -> ca.Function:
+        return ca.Function(f"hybrid_{name}", self.arguments, [ca.densify(result) for result in results])
+
+
+def depends_on(function: ca.Function, result: int, argument: int) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Return which elements of a function's result depend on which elements of an argument.
+
+    Returns
+    -------
+    ndarray of bool, shape (result elements, argument elements)
+    """
+    rows, columns = function.size1_out(result), function.size1_in(argument)
+    if rows == 0 or columns == 0:
+        return np.zeros((rows, columns), dtype=bool)
+    pattern = ca.DM(function.jac_sparsity(result, argument), 1)
+    return np.asarray(pattern.full(), dtype=bool)

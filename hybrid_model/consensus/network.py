@@ -1,0 +1,104 @@
+"""From a scenario to automata: the agents, their wiring, and the closed loop composed of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import hybrid_model as hm
+from hybrid_model.consensus.agents import DynamicTrigger, EventGenerator, Integrator, StaticTrigger, agent
+from hybrid_model.consensus.edges import (
+    ConstantWeights,
+    GatedAbsoluteSineWeights,
+    GatedSineWeights,
+    PeriodicSwitching,
+)
+from hybrid_model.consensus.scenario_data import Scenario, TriggerKind
+from hybrid_model.consensus.switching import NoSwitching
+from hybrid_model.consensus.weights import ConstantWeight, WeightMap
+
+
+def agent_name(number: int) -> str:
+    """Return the name of agent `number`, counted from 1."""
+    return f"agent{number}"
+
+
+def scenario_agents(scenario: Scenario) -> dict[str, hm.Composition]:
+    """Make the agents of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Network, weights, switching and trigger.
+
+    Returns
+    -------
+    dict
+        Agent name -> automaton with inputs ``neighbours`` (in the order of the agent's edges) and outputs ``x``,
+        ``broadcast`` and ``events``.
+    """
+    return {agent_name(i): _agent(scenario, i) for i in range(1, scenario.network.agents + 1)}
+
+
+def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
+    """Return which broadcast values each agent receives, as ``"agent1.neighbours"`` -> ``["agent2.broadcast", ...]``."""
+    wires = {}
+    for i in range(1, scenario.network.agents + 1):
+        others = [_other_end(scenario, edge, i) for edge in _edges_of(scenario, i)]
+        wires[f"{agent_name(i)}.neighbours"] = [f"{agent_name(j)}.broadcast" for j in others]
+    return wires
+
+
+def closed_loop(scenario: Scenario) -> hm.Composition:
+    """Compose the agents of a scenario to one automaton."""
+    return hm.Composition(scenario.name, scenario_agents(scenario), broadcast_wires(scenario))
+
+
+def _edges_of(scenario: Scenario, number: int) -> list[int]:
+    return [k for k, edge in enumerate(scenario.network.edges) if number in edge]
+
+
+def _other_end(scenario: Scenario, edge: int, number: int) -> int:
+    first, second = scenario.network.edges[edge]
+    return second if first == number else first
+
+
+def _agent(scenario: Scenario, number: int) -> hm.Composition:
+    edges = _edges_of(scenario, number)
+    initial = scenario.network.initial[number - 1]
+    return agent(
+        agent_name(number),
+        Integrator(degree=len(edges), x=initial, gain=scenario.network.gain),
+        _weights(scenario, edges),
+        _trigger(scenario),
+        _switching(scenario, edges),
+    )
+
+
+def _trigger(scenario: Scenario) -> EventGenerator:
+    trigger = scenario.trigger
+    if trigger.kind is TriggerKind.STATIC:
+        return StaticTrigger(threshold=trigger.threshold)
+    return DynamicTrigger(threshold=trigger.threshold, decay=trigger.decay)
+
+
+def _weights(scenario: Scenario, edges: list[int]) -> hm.Automaton:
+    waveforms = [scenario.weights.waveforms[k] for k in edges]
+    constant = [w for w in waveforms if isinstance(w, ConstantWeight)]
+    if len(constant) == len(waveforms):
+        return ConstantWeights(degree=len(edges), value=np.array([w.level for w in constant]))
+    gated = [w for w in waveforms if not isinstance(w, ConstantWeight)]
+    block = GatedSineWeights if gated[0].map is WeightMap.SQUARE else GatedAbsoluteSineWeights
+    return block(
+        gate_rate=[w.gate_rate for w in gated],
+        sine_rate=[w.sine_rate for w in gated],
+        duty_percent=[w.duty_percent for w in gated],
+        phase=[w.phase for w in gated],
+    )
+
+
+def _switching(scenario: Scenario, edges: list[int]) -> PeriodicSwitching | None:
+    switching = scenario.switching
+    if isinstance(switching, NoSwitching) or not edges:
+        return None
+    active = [[float(k + 1 in row) for k in edges] for row in switching.active]
+    return PeriodicSwitching(dwell=switching.dwell, active=active)
