@@ -7,12 +7,13 @@ Between two broadcasts every broadcast value is constant, so
 and the integrals of the weights are elementary. Windows, dwell intervals and integrals are written out here once more,
 from the formulas of the paper's section 7, and share no code with the package.
 
-An event is the first root of ``f(t) = |xhat_i - x_i(t)| - c exp(-beta t)``. It is approached from the left by steps that
-cannot pass it: with ``f'' <= K`` the parabola ``f + f' h + K h^2/2`` lies above f, so f has no root before the parabola
+An event is the first root of ``f(t) = |xhat_i - x_i(t)| - c exp(-beta t)``. It is approached from the left by steps
+that cannot pass it: with ``f'' <= K`` the parabola ``f + f' h + K h^2/2`` lies above f, so f has no root before the parabola
 has one. Near a root this is Newton's method. No root is skipped, however many lie in one piece.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -47,7 +48,7 @@ def exact_run(scenario: Scenario, *, max_events: int = 100_000) -> ExactRun:
     """
     loop = ClosedLoop(scenario)
     times = cut_times(scenario)
-    for start, end in zip(times[:-1], times[1:], strict=True):
+    for start, end in pairwise(times):
         piece = WeightsOnPiece(scenario, (start + end) / 2)
         loop.run_piece(piece, end, max_events)
     return ExactRun([np.array(events) for events in loop.events], loop.x)
@@ -89,7 +90,7 @@ class ClosedLoop:
         return self.x - self.gain * self.node_sums(piece.integral(self.t, t))
 
     def first_event(self, piece, end):
-        """Time of the first event in the interval from self.t to `end`, and who fires then; `end` and nobody if none."""
+        """Time of the first event from self.t to `end`, and who fires then; `end` and nobody if there is none."""
         curvature = self.gain * self.absolute_sums(piece.slope_bound())
         t = self.t
         while True:
