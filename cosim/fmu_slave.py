@@ -52,7 +52,9 @@ class FmuSlave(Slave):
             [v.name for v in description.modelVariables if v.type == "Clock" and v.causality == "output"],
         )
         self.has_event_mode = bool(description.coSimulation.hasEventMode)
-        self.can_restore = bool(description.coSimulation.canGetAndSetFMUState)
+        self.can_restore = bool(description.coSimulation.canGetAndSetFMUstate)
+        experiment = description.defaultExperiment
+        self.default_stop_time = float(experiment.stopTime) if experiment and experiment.stopTime else None
         self._clock_references = [self._variables[clock].valueReference for clock in self.clocks]
         self._messages: list[str] = []
         self._token = description.instantiationToken

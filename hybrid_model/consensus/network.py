@@ -40,7 +40,7 @@ def scenario_agents(scenario: Scenario) -> dict[str, hm.Composition]:
 
 
 def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
-    """Return which broadcast values each agent receives, as ``"agent1.neighbours"`` -> ``["agent2.broadcast", ...]``."""
+    """Return which broadcasts each agent receives, as ``"agent1.neighbours"`` -> ``["agent2.broadcast", ...]``."""
     wires = {}
     for i in range(1, scenario.network.agents + 1):
         others = [_other_end(scenario, edge, i) for edge in _edges_of(scenario, i)]

@@ -1,0 +1,86 @@
+"""`hybrid-fmu cosim`: co-simulate a scenario's agents as FMUs, or run a single FMU."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from cosim.cli.agents import fmu_system
+from cosim.cli.exits import Exit, UsageError, progress, start_values, write_csv
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_event_exact, run_fixed_step
+from cosim.result import CosimResult, Ended
+from cosim.system import System
+from fmu.export import export_fmu
+from hybrid_model.consensus.network import scenario_agents
+from hybrid_model.consensus.scenario import load_scenario
+from hybrid_model.consensus.scenario_data import Scenario
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser("cosim", help="co-simulate a scenario's agents, or run one FMU", allow_abbrev=False)
+    parser.add_argument("system", metavar="SYSTEM", help="name of a preset, path of a TOML file, or an .fmu")
+    parser.add_argument("--master", choices=("event-exact", "fixed-step"), default="event-exact")
+    parser.add_argument("--stop-time", type=float, help="end of the run in s; an .fmu without a default needs it")
+    parser.add_argument(
+        "--step-size", type=float, default=0.01, help="communication step of the fixed-step master in s"
+    )
+    parser.add_argument("--output-interval", type=float, default=0.1, help="spacing of the output in s (event-exact)")
+    parser.add_argument("--start-value", action="append", default=[], metavar="NAME=VALUE", help="repeatable")
+    parser.add_argument("--output-file", type=Path, metavar="F.csv", help="write all outputs over time")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    starts = start_values(options.start_value)
+    with tempfile.TemporaryDirectory() as folder:
+        if Path(options.system).suffix == ".fmu":
+            slave = FmuSlave(Path(options.system).stem, options.system)
+            system, stop_time = System([slave], {}), options.stop_time or slave.default_stop_time
+            if stop_time is None:
+                raise UsageError(f"{options.system} proposes no stop time: give --stop-time.")
+        else:
+            scenario = load_scenario(options.system)
+            system, stop_time = _agents(scenario, Path(folder)), options.stop_time or scenario.stop_time
+        for name, value in starts.items():
+            _set_start(system, name, value)
+        result = _run(system, stop_time, options)
+    if options.output_file:
+        write_csv(options.output_file, result.times, result.signals)
+    print(_text(result))
+    return Exit.DONE if result.ended is Ended.HORIZON else Exit.FAILED
+
+
+def _agents(scenario: Scenario, folder: Path) -> System:
+    fmus = {}
+    for name, automaton in scenario_agents(scenario).items():
+        progress(f"exporting {name}")
+        fmus[name] = export_fmu(automaton, folder / f"{name}.fmu")
+    return fmu_system(scenario, fmus)
+
+
+def _set_start(system: System, name: str, value: float) -> None:
+    owner = next((n for n in sorted(system.slaves, key=len, reverse=True) if name.startswith(n + ".")), None)
+    if owner is None and len(system.slaves) == 1:
+        owner, name = next(iter(system.slaves)), f"{next(iter(system.slaves))}.{name}"
+    if owner is None:
+        raise UsageError(f"--start-value {name} names no slave; the slaves are {', '.join(system.slaves)}.")
+    system.slaves[owner].set(name[len(owner) + 1 :], value)
+
+
+def _run(system: System, stop_time: float, options: argparse.Namespace) -> CosimResult:
+    if options.master == "fixed-step":
+        return run_fixed_step(system, stop_time, options.step_size, record=True)
+    return run_event_exact(system, stop_time, output_interval=options.output_interval)
+
+
+def _text(result: CosimResult) -> str:
+    lines = [result.message or f"reached t = {result.t:.9g} s in {result.steps} steps"]
+    clocks = sorted({(tick.slave, tick.clock) for tick in result.ticks})
+    lines += [f"  {slave}.{clock}: {len(result.tick_times(slave, clock))} ticks" for slave, clock in clocks]
+    lines += [f"  {name} = {value:.12g}" for name, value in result.final.items()]
+    return "\n".join(lines)

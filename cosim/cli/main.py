@@ -1,0 +1,54 @@
+"""`hybrid-fmu`: parse the command line, run a command, turn errors into sentences and exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+
+from cosim.cli import cosimulate, export, paper, simulate
+from cosim.cli.exits import Exit, UsageError
+from cosim.errors import CosimError
+from fmu.build import BuildError
+from fmu.errors import ExportError
+from hybrid_model import HybridModelError
+from hybrid_model.consensus.tables import ScenarioError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+
+    Returns
+    -------
+    int
+        Exit status: 0 done, 1 failed, 2 wrong usage, 3 stopped by a Zeno guard.
+    """
+    parser = argparse.ArgumentParser(
+        prog="hybrid-fmu",
+        description="Hybrid automata: run them event-exactly, export them as FMUs, co-simulate them.",
+        allow_abbrev=False,
+    )
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    for command in (paper, simulate, export, cosimulate):
+        command.add_parser(commands)
+    options = parser.parse_args(arguments)
+    try:
+        return int(options.run(options))
+    except (ScenarioError, UsageError) as error:
+        return _report(error, Exit.USAGE)
+    except (HybridModelError, ExportError, BuildError, CosimError, OSError) as error:
+        return _report(error, Exit.FAILED)
+
+
+def _report(error: Exception, status: Exit) -> int:
+    print(f"hybrid-fmu: {error}", file=sys.stderr)
+    return int(status)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,213 @@
+"""`hybrid-fmu paper`: the paper's simulation section in three executions, compared, with figures."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import hybrid_model as hm
+from cosim.cli.agents import fmu_system, in_process_system, network_report
+from cosim.cli.exits import exit_of, progress
+from cosim.masters import run_event_exact, run_fixed_step
+from cosim.result import CosimResult
+from fmu.export import Fmi, export_fmu
+from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound, convergence_bound
+from hybrid_model.consensus.figures import save_paper_figures
+from hybrid_model.consensus.network import agent_name, closed_loop, scenario_agents
+from hybrid_model.consensus.report import RunReport, edge_norm, run_report
+from hybrid_model.consensus.scenario import load_scenario
+from hybrid_model.consensus.scenario_data import Scenario, replace_trigger
+
+PRESET = "paper-a"
+FIXED_STEPS = (0.1, 0.01, 0.001)
+"""Communication steps in s of the comparison: what people use."""
+COMPARE_INTERVAL = 0.5
+"""In s: states of the executions are compared at multiples of this time."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One way to run a scenario, and how far it is from the Python run."""
+
+    name: str
+    events: list[int]
+    edge_norm_end: float
+    event_time_difference: float | None
+    state_difference: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All executions of one scenario."""
+
+    scenario: Scenario
+    arc: hm.HybridArc
+    report: RunReport
+    fmus: list[str]
+    exact: list[Trial]
+    fixed: dict[float, Trial]
+    bounds: dict[BoundForm, ConvergenceBound]
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser(
+        "paper", help="reproduce the paper's simulations in all executions", allow_abbrev=False
+    )
+    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for all results")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    dynamic = load_scenario(PRESET)
+    scenarios = {"static": replace_trigger(dynamic, "static"), "dynamic": dynamic}
+    comparisons = {kind: _compare(kind, scenario, options.out) for kind, scenario in scenarios.items()}
+    progress("drawing the figures")
+    for kind, comparison in comparisons.items():
+        save_paper_figures(kind, comparison.scenario, comparison.arc, list(comparison.bounds.values()), options.out)
+    summary = options.out / "summary.json"
+    summary.write_text(json.dumps(_summary(comparisons), indent=2) + "\n", encoding="utf-8")
+    print(_table(comparisons))
+    print(f"\nFigures, FMUs and summary.json are in {options.out}.")
+    return max(exit_of(comparison.arc.stop) for comparison in comparisons.values())
+
+
+def _compare(kind: str, scenario: Scenario, out: Path) -> Comparison:
+    progress(f"{kind}: running in Python")
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
+    report = run_report(scenario, arc)
+    fmus = _export(kind, scenario, out)
+    progress(f"{kind}: co-simulating, event-exact")
+    trials = {
+        "automata in one process": run_event_exact(
+            in_process_system(scenario), scenario.stop_time, output_interval=COMPARE_INTERVAL
+        ),
+        "FMUs through fmpy": run_event_exact(
+            fmu_system(scenario, fmus), scenario.stop_time, output_interval=COMPARE_INTERVAL
+        ),
+    }
+    exact = [_exact_trial(name, scenario, arc, report, result) for name, result in trials.items()]
+    fixed = {}
+    for step in FIXED_STEPS:
+        progress(f"{kind}: co-simulating, fixed step {step:g} s")
+        result = run_fixed_step(fmu_system(scenario, fmus), scenario.stop_time, step)
+        fixed[step] = _fixed_trial(step, scenario, report, result)
+    bounds = {form: convergence_bound(scenario, form) for form in BoundForm}
+    return Comparison(
+        scenario, arc, report, [str(path.relative_to(out)) for path in fmus.values()], exact, fixed, bounds
+    )
+
+
+def _export(kind: str, scenario: Scenario, out: Path) -> dict[str, Path]:
+    folder = out / "fmus" / kind
+    folder.mkdir(parents=True, exist_ok=True)
+    fmus = {}
+    for name, automaton in scenario_agents(scenario).items():
+        progress(f"{kind}: exporting {name}")
+        fmus[name] = export_fmu(automaton, folder / f"{name}.fmu", stop_time=scenario.stop_time)
+    return fmus
+
+
+def _exact_trial(name: str, scenario: Scenario, arc: hm.HybridArc, report: RunReport, result: CosimResult) -> Trial:
+    other = network_report(scenario, result)
+    times = None
+    if other.events_per_agent == report.events_per_agent:
+        pairs = zip(report.event_times, other.event_times, strict=True)
+        times = max((float(np.max(np.abs(a - b), initial=0.0)) for a, b in pairs), default=0.0)
+    names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
+    states = max(float(np.max(np.abs(arc.at(x, result.times) - result.signals[x]))) for x in names)
+    return Trial(name, other.events_per_agent, other.edge_norm_end, times, states)
+
+
+def _fixed_trial(step: float, scenario: Scenario, report: RunReport, result: CosimResult) -> Trial:
+    names = [agent_name(i) for i in range(1, scenario.network.agents + 1)]
+    x_end = np.array([result.final[f"{name}.x"] for name in names])
+    events = [int(result.final[f"{name}.events"]) for name in names]
+    difference = float(np.max(np.abs(x_end - report.x_end)))
+    return Trial(f"FMUs, fixed step {step:g} s", events, edge_norm(scenario, x_end), None, difference)
+
+
+def _summary(comparisons: Mapping[str, Comparison]) -> dict[str, Any]:
+    return {
+        "scenario": PRESET,
+        "runs": {kind: comparison.report.as_dict() for kind, comparison in comparisons.items()},
+        "cosim": {kind: _cosim_summary(comparison) for kind, comparison in comparisons.items()},
+        "certificates": {kind: _certificates(comparison) for kind, comparison in comparisons.items()},
+    }
+
+
+def _cosim_summary(comparison: Comparison) -> dict[str, Any]:
+    in_process, fmus = comparison.exact
+    return {
+        "fmi": Fmi.V3_0.value,
+        "fmus": comparison.fmus,
+        **_trial_summary(fmus),
+        "in_process": _trial_summary(in_process),
+        "fixed_step": [
+            {
+                "step": step,
+                "events_per_agent": trial.events,
+                "events_total": sum(trial.events),
+                "edge_norm_end": trial.edge_norm_end,
+                "max_final_state_difference": trial.state_difference,
+            }
+            for step, trial in comparison.fixed.items()
+        ],
+    }
+
+
+def _trial_summary(trial: Trial) -> dict[str, Any]:
+    return {
+        "max_event_time_difference": trial.event_time_difference,
+        "max_state_difference": trial.state_difference,
+        "events_total": sum(trial.events),
+    }
+
+
+def _certificates(comparison: Comparison) -> dict[str, Any]:
+    return {
+        form.value: {
+            "window": bound.window,
+            "rate": bound.rate,
+            "overshoot": bound.overshoot,
+            "kappa1": bound.kappa1,
+            "kappa2": bound.kappa2,
+            "radius": bound.radius,
+            "notes": list(bound.notes),
+        }
+        for form, bound in comparison.bounds.items()
+    }
+
+
+def _table(comparisons: Mapping[str, Comparison]) -> str:
+    lines = [
+        f"{'trigger':<8} {'execution':<28} {'events':>6}  {'per agent':<15} {'|x_e(T)|':>10}  "
+        f"{'event times':>11}  {'states':>8}",
+        f"{'':<8} {'':<28} {'':>6}  {'':<15} {'':>10}  {'differ by':>11}  {'by':>8}",
+    ]
+    for kind, comparison in comparisons.items():
+        report = comparison.report
+        python = Trial("Python, one automaton", report.events_per_agent, report.edge_norm_end, 0.0, 0.0)
+        for trial in (python, *comparison.exact, *comparison.fixed.values()):
+            lines.append(_row(kind, trial, reference=trial is python))
+            kind = ""
+    return "\n".join(lines)
+
+
+def _row(kind: str, trial: Trial, *, reference: bool) -> str:
+    if reference:
+        differences = f"{'reference':>11}  {'':>8}"
+    else:
+        times = "lost" if trial.event_time_difference is None else f"{trial.event_time_difference:.1e} s"
+        differences = f"{times:>11}  {trial.state_difference:>8.1e}"
+    agents = ", ".join(map(str, trial.events))
+    return (
+        f"{kind:<8} {trial.name:<28} {sum(trial.events):>6}  {agents:<15} {trial.edge_norm_end:>10.6f}  {differences}"
+    )

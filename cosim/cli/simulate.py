@@ -1,0 +1,84 @@
+"""`hybrid-fmu simulate`: one run of a scenario."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import hybrid_model as hm
+from cosim.cli.agents import in_process_system, network_report
+from cosim.cli.exits import exit_of, write_csv
+from cosim.masters import run_event_exact
+from hybrid_model.consensus.network import agent_name, closed_loop
+from hybrid_model.consensus.report import RunReport, run_report
+from hybrid_model.consensus.scenario import load_scenario
+from hybrid_model.consensus.scenario_data import Scenario
+
+AUTOMATON_AGENTS = 8
+"""Up to this many agents `auto` runs the closed loop as one automaton; beyond, event by event over the network."""
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser("simulate", help="run a scenario", allow_abbrev=False)
+    parser.add_argument("scenario", metavar="SCENARIO", help="name of a preset, or path of a TOML file")
+    parser.add_argument(
+        "--engine",
+        choices=("auto", "automaton", "network"),
+        default="auto",
+        help="automaton: the closed loop as one automaton; network: agent by agent, event by event",
+    )
+    parser.add_argument("--stop-time", type=float, help="end of the run in s, instead of the scenario's")
+    parser.add_argument("--output-interval", type=float, default=0.1, help="spacing of the trajectory in s")
+    parser.add_argument("--json", action="store_true", help="print the run as a JSON object")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="write run.json and trajectory.csv there")
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    scenario = load_scenario(options.scenario)
+    if options.stop_time is not None:
+        scenario = dataclasses.replace(scenario, stop_time=options.stop_time)
+    one = options.engine == "automaton" or (options.engine == "auto" and scenario.network.agents <= AUTOMATON_AGENTS)
+    report, times, signals = (_as_one if one else _as_network)(scenario, options.output_interval)
+    document = json.dumps({"scenario": scenario.name, **report.as_dict(), "message": report.message}, indent=2)
+    if options.out:
+        options.out.mkdir(parents=True, exist_ok=True)
+        (options.out / "run.json").write_text(document + "\n", encoding="utf-8")
+        write_csv(options.out / "trajectory.csv", times, signals)
+    print(document if options.json else _text(scenario, report))
+    return exit_of(hm.Stop[report.stop])
+
+
+def _as_one(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[str, Any]]:
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
+    end = float(arc.t[-1])
+    times = np.minimum(np.arange(int(np.ceil(end / interval)) + 1) * interval, end)
+    names = [f"{agent_name(i)}.{item}" for i in range(1, scenario.network.agents + 1) for item in ("x", "broadcast")]
+    return run_report(scenario, arc), times.tolist(), {name: arc.at(name, times).tolist() for name in names}
+
+
+def _as_network(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[str, Any]]:
+    result = run_event_exact(in_process_system(scenario), scenario.stop_time, output_interval=interval)
+    signals = {name: values for name, values in result.signals.items() if name.endswith((".x", ".broadcast"))}
+    return network_report(scenario, result), result.times, signals
+
+
+def _text(scenario: Scenario, report: RunReport) -> str:
+    gap = "none" if report.min_gap is None else f"{report.min_gap:.6g} s"
+    return "\n".join(
+        [
+            f"{scenario.name}: {report.message}",
+            f"  events          {sum(report.events_per_agent)} (per agent {', '.join(map(str, report.events_per_agent))})",
+            f"  shortest gap    {gap}",
+            f"  final states    {', '.join(f'{x:.9g}' for x in report.x_end)}",
+            f"  |x_e| at end    {report.edge_norm_end:.6g}",
+            f"  drift of mean   {report.mean_drift:.2g}",
+        ]
+    )
