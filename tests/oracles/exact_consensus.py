@@ -8,8 +8,8 @@ and the integrals of the weights are elementary. Windows, dwell intervals and in
 from the formulas of the paper's section 7, and share no code with the package.
 
 An event is the first root of ``f(t) = |xhat_i - x_i(t)| - c exp(-beta t)``. It is approached from the left by steps
-that cannot pass it: with ``f'' <= K`` the parabola ``f + f' h + K h^2/2`` lies above f, so f has no root before the parabola
-has one. Near a root this is Newton's method. No root is skipped, however many lie in one piece.
+that cannot pass it: with ``f'' <= K`` the parabola ``f + f' h + K h^2/2`` lies above f, so f has no root before the
+parabola has one. Near a root this is Newton's method. No root is skipped, however many lie in one piece.
 """
 
 from dataclasses import dataclass
@@ -124,7 +124,7 @@ def safe_step(f, slope, curvature):
     """Positive root of ``f + slope*h + curvature*h^2/2``; infinite if there is none, 0 if f is not negative."""
     f = np.minimum(f, 0.0)
     root = np.sqrt(slope**2 - 2 * curvature * f)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         # Each form of the root is free of cancellation for one sign of the slope.
         rising = -2 * f / (slope + root)
         falling = (root - slope) / curvature
