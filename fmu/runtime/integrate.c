@@ -1,0 +1,240 @@
+/* The flow: Dormand-Prince 5(4) with error control and interpolation.
+
+   J. R. Dormand, P. J. Prince, "A family of embedded Runge-Kutta formulae", 1980; starting step and
+   interpolation after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential
+   Equations I", sections II.4 and II.6. */
+#include <math.h>
+#include <string.h>
+
+#include "parts.h"
+
+static const double NODE[N_STAGES] = {0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0};
+/* The last row is also the step itself. */
+static const double TABLE[N_STAGES][N_STAGES - 1] = {
+    {0.0, 0.0, 0.0, 0.0, 0.0, 0.0},
+    {0.2, 0.0, 0.0, 0.0, 0.0, 0.0},
+    {3.0 / 40.0, 9.0 / 40.0, 0.0, 0.0, 0.0, 0.0},
+    {44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0, 0.0, 0.0, 0.0},
+    {19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0, 0.0, 0.0},
+    {9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0, 0.0},
+    {35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0},
+};
+static const double ERROR_WEIGHT[N_STAGES] = {
+    71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0};
+static const double DENSE_WEIGHT[N_STAGES] = {-12715105075.0 / 11282082432.0, 0.0,
+                                              87487479700.0 / 32700410799.0,  -10690763975.0 / 1880347072.0,
+                                              701980252875.0 / 199316789632.0, -1453857185.0 / 822651844.0,
+                                              69997945.0 / 29380423.0};
+
+double time_ulp(double t)
+{
+    double size = fabs(t);
+    return nextafter(size, INFINITY) - size;
+}
+
+static bool derivative(Engine *engine, double t, const double *x, const double *z, double *result)
+{
+    if (engine->model->n_states == 0)
+        return true;
+    if (evaluate(engine, engine->model->flow, t, x, z, result, NULL))
+        return true;
+    return problem(engine, ENDED_FAILED, "The flow map of '%s' could not be evaluated at t = %.17g.",
+                   engine->model->name, t);
+}
+
+/* result = x0 + h * (sum of the first `n` stages with the weights). */
+static void combine(size_t n_states, const double *x0, double h, const double *weights, double *const *k, size_t n,
+                    double *result)
+{
+    for (size_t i = 0; i < n_states; i++) {
+        double sum = 0.0;
+        for (size_t j = 0; j < n; j++)
+            sum += weights[j] * k[j][i];
+        result[i] = x0[i] + h * sum;
+    }
+}
+
+/* Stages 1 to 5 and the end of a step of h = t1 - t0; stage 0 must be there. */
+static bool stages(Engine *engine, const double *z, double t0, double t1, const double *x0, double *const *k,
+                   double *x1)
+{
+    size_t n_states = engine->model->n_states;
+    double h = t1 - t0;
+    for (size_t s = 1; s < N_STAGES - 1; s++) {
+        combine(n_states, x0, h, TABLE[s], k, s, x1);
+        double t = s == N_STAGES - 2 ? t1 : t0 + NODE[s] * h;
+        if (!derivative(engine, t, x1, z, k[s]))
+            return false;
+    }
+    combine(n_states, x0, h, TABLE[N_STAGES - 1], k, N_STAGES - 1, x1);
+    return true;
+}
+
+static double scale(const Engine *engine, double size)
+{
+    return engine->status->absolute_tolerance + engine->status->relative_tolerance * size;
+}
+
+/* The error of the step in units of the tolerance, infinite if anything is not finite. */
+static double step_error(Engine *engine, const Step *step, double h)
+{
+    double worst = 0.0;
+    for (size_t i = 0; i < engine->model->n_states; i++) {
+        double sum = 0.0;
+        for (size_t s = 0; s < N_STAGES; s++)
+            sum += ERROR_WEIGHT[s] * step->k[s][i];
+        double error = fabs(h * sum) / scale(engine, fmax(fabs(step->x0[i]), fabs(step->x1[i])));
+        if (!isfinite(error) || !isfinite(step->x1[i])) {
+            engine->suspect = i;
+            return INFINITY;
+        }
+        if (error > worst) {
+            worst = error;
+            engine->suspect = i;
+        }
+    }
+    return worst;
+}
+
+/* The largest component in units of the tolerance at x0. */
+static double size_in_tolerances(const Engine *engine, const double *x0, const double *values, const double *minus)
+{
+    double worst = 0.0;
+    for (size_t i = 0; i < engine->model->n_states; i++) {
+        double value = minus ? values[i] - minus[i] : values[i];
+        worst = fmax(worst, fabs(value) / scale(engine, fabs(x0[i])));
+    }
+    return worst;
+}
+
+/* A first step from the sizes of the state and of its first two derivatives. */
+static bool starting_step(Engine *engine, const Point *point, double *h)
+{
+    Step *step = &engine->step;
+    double t = *point->time;
+    double d0 = size_in_tolerances(engine, point->x, point->x, NULL);
+    double d1 = size_in_tolerances(engine, point->x, step->k[0], NULL);
+    double first = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
+    first = fmax(first, 64.0 * time_ulp(t));
+    for (size_t i = 0; i < engine->model->n_states; i++)
+        step->x1[i] = point->x[i] + first * step->k[0][i];
+    if (!derivative(engine, t + first, step->x1, point->z, step->k[1]))
+        return false;
+    double d2 = size_in_tolerances(engine, point->x, step->k[1], step->k[0]) / first;
+    double steepest = fmax(d1, d2);
+    double second = steepest <= 1e-15 ? 1e-3 : pow(0.01 / steepest, 0.2);
+    *h = isfinite(second) ? fmin(100.0 * first, second) : first;
+    *h = fmax(*h, 64.0 * time_ulp(t));
+    return true;
+}
+
+bool step_begin(Engine *engine, const Point *point)
+{
+    Step *step = &engine->step;
+    double t = *point->time;
+    step->t0 = step->t1 = t;
+    step->x0 = point->x;
+    step->has_dense = false;
+    if (!derivative(engine, t, point->x, point->z, step->k[0]))
+        return false;
+    for (size_t i = 0; i < engine->model->n_states; i++)
+        if (!isfinite(step->k[0][i]))
+            return problem(engine, ENDED_NOT_FINITE,
+                           "The derivative of '%s' is %g at t = %.17g where '%s' = %.17g; derivatives must be finite. "
+                           "Remedy: check the flow map and the parameters.",
+                           engine->model->state_names[i], step->k[0][i], t, engine->model->state_names[i],
+                           point->x[i]);
+    return true;
+}
+
+static bool step_too_small(Engine *engine, const Point *point, double h, bool finite)
+{
+    const char *name = engine->model->state_names[engine->suspect];
+    double value = point->x[engine->suspect];
+    if (!finite)
+        return problem(engine, ENDED_NOT_FINITE,
+                       "'%s' = %.17g does not stay finite beyond t = %.17g. Remedy: check the flow map for a division "
+                       "by zero or a finite escape time, or keep the state in a flow set.",
+                       name, value, *point->time);
+    return problem(engine, ENDED_FAILED,
+                   "The solver needs steps below %.3g s at t = %.17g, where '%s' = %.17g changes too fast for its "
+                   "tolerance. Remedy: declare a discontinuity of the flow map as a time event, or scale the state.",
+                   h, *point->time, name, value);
+}
+
+bool step_accept(Engine *engine, const Point *point, double limit)
+{
+    Step *step = &engine->step;
+    double t0 = *point->time, remaining = limit - t0, h = *point->step;
+    bool rejected = false;
+    if (h <= 0.0 && !starting_step(engine, point, &h))
+        return false;
+    for (;;) {
+        /* The last two steps share what remains, so that no sliver is left. */
+        bool whole = h >= remaining;
+        double used = whole ? remaining : 2.0 * h > remaining ? 0.5 * remaining : h;
+        step->t1 = whole ? limit : t0 + used;
+        used = step->t1 - t0;
+        if (!stages(engine, point->z, t0, step->t1, step->x0, step->k, step->x1) ||
+            !derivative(engine, step->t1, step->x1, point->z, step->k[N_STAGES - 1]))
+            return false;
+        double error = step_error(engine, step, used);
+        if (error <= 1.0) {
+            double growth = error > 0.0 ? fmin(10.0, 0.9 * pow(error, -0.2)) : 10.0;
+            double proposal = used * (rejected ? fmin(1.0, growth) : fmax(0.2, growth));
+            *point->step = used < h ? fmax(h, proposal) : proposal;
+            step->has_dense = false;
+            return true;
+        }
+        h = used * (isfinite(error) ? fmax(0.1, 0.9 * pow(error, -0.2)) : 0.1);
+        rejected = true;
+        if (h < 16.0 * time_ulp(t0) || t0 + h <= t0)
+            return step_too_small(engine, point, h, isfinite(error));
+    }
+}
+
+void step_commit(Engine *engine, const Point *point)
+{
+    Step *step = &engine->step;
+    double *last = step->k[N_STAGES - 1];
+    *point->time = step->t1;
+    memcpy(point->x, step->x1, engine->model->n_states * sizeof(double));
+    /* The last stage is the first one of the next step. */
+    step->k[N_STAGES - 1] = step->k[0];
+    step->k[0] = last;
+    step->t0 = step->t1;
+    step->has_dense = false;
+}
+
+bool step_probe(Engine *engine, const Point *point, double t)
+{
+    engine->probe_k[0] = engine->step.k[0];
+    return stages(engine, point->z, engine->step.t0, t, engine->step.x0, engine->probe_k, engine->probe_x);
+}
+
+static void prepare_dense(Engine *engine)
+{
+    Step *step = &engine->step;
+    double h = step->t1 - step->t0;
+    for (size_t i = 0; i < engine->model->n_states; i++) {
+        double change = step->x1[i] - step->x0[i], sum = 0.0;
+        for (size_t s = 0; s < N_STAGES; s++)
+            sum += DENSE_WEIGHT[s] * step->k[s][i];
+        step->dense[0][i] = h * step->k[0][i] - change;
+        step->dense[1][i] = change - h * step->k[N_STAGES - 1][i] - step->dense[0][i];
+        step->dense[2][i] = h * sum;
+    }
+    step->has_dense = true;
+}
+
+void step_dense(Engine *engine, double t)
+{
+    Step *step = &engine->step;
+    if (!step->has_dense)
+        prepare_dense(engine);
+    double a = (t - step->t0) / (step->t1 - step->t0), b = 1.0 - a;
+    for (size_t i = 0; i < engine->model->n_states; i++) {
+        double inner = step->dense[0][i] + a * (step->dense[1][i] + b * step->dense[2][i]);
+        engine->dense_x[i] = step->x0[i] + a * (step->x1[i] - step->x0[i] + b * inner);
+    }
+}

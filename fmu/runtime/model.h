@@ -1,0 +1,65 @@
+/* What a generated model tells the engine.
+
+   The exporter writes one file, model.c, that defines `const Model model` and the
+   tables behind it.  Every expression in it is traced from the automaton's Python
+   declaration; nothing about a model is written by hand. */
+#ifndef HYBRID_MODEL_H
+#define HYBRID_MODEL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+/* Calling convention of the generated functions (CasADi): arg[i] is input i, res[i] output i,
+   iw and w are work arrays of n_iw integers and n_w doubles; 0 means success. */
+typedef int (*ModelFunction)(const double **arg, double **res, long long *iw, double *w, int mem);
+/* Inputs of each of them, in this order: t (1), x (n_states), z (n_discrete), u (n_inputs), p (n_parameters). */
+#define MODEL_N_ARG 5
+
+typedef enum { JUMP_ON_STATE, JUMP_ON_TIME } JumpKind;
+
+typedef struct {
+    const char *name;
+    JumpKind kind;
+    size_t index;          /* of its margin among the jump margins, or of its time among the times */
+    bool internal;         /* a breakpoint of the flow: depends on t, z, p only, is invisible outside (JUMP_ON_TIME only) */
+    ModelFunction reset;   /* (t,x,z,u,p) -> x+ (n_states), z+ (n_discrete) */
+} ModelJump;
+
+typedef enum { BANK_TIME, BANK_STATE, BANK_DISCRETE, BANK_INPUT, BANK_PARAMETER, BANK_OUTPUT, BANK_CLOCK } Bank;
+typedef enum { TYPE_FLOAT64, TYPE_INT32, TYPE_BOOLEAN, TYPE_CLOCK } Type;
+
+typedef struct {
+    const char *name;
+    Type type;
+    Bank bank;
+    size_t index;          /* in its bank; for BANK_CLOCK the clock's index */
+    bool discrete;         /* variability discrete (inputs, outputs) */
+    bool calculated;       /* its start value is computed by `start`, so it cannot be set */
+} ModelVariable;
+
+typedef struct {
+    const char *name;                  /* model name, for messages */
+    const char *token;                 /* instantiation token */
+    size_t n_states, n_discrete, n_inputs, n_parameters, n_outputs;
+    size_t n_margins, n_times;         /* jump margins (without the flow set's), times */
+    size_t n_jumps, n_clocks, n_variables;
+    size_t n_arg, n_res, n_iw, n_w;    /* sizes of the work arrays that the functions need (maximum over all) */
+    bool flow_priority;                /* flow wins where flow set and jump set overlap (default: jump) */
+    bool has_flow_set;                 /* false: flow is allowed everywhere */
+    bool predictable;                  /* all inputs discrete: the next event follows from the state */
+    const double *x, *z, *u, *p;       /* start values */
+    ModelFunction start;               /* (t,x,z,u,p) -> x0, z0: start values that are computed; copies the others */
+    ModelFunction flow;                /* -> dx/dt (n_states) */
+    ModelFunction flow_set;            /* -> margin (1); used when has_flow_set */
+    ModelFunction margins;             /* -> jump margins (n_margins) */
+    ModelFunction times;               /* -> absolute times of the time events (n_times) */
+    ModelFunction outputs;             /* -> y (n_outputs) */
+    const ModelJump *jumps;            /* in the fixed order in which simultaneous ones are taken */
+    const size_t *clock_jump;          /* n_clocks: the jump with which each clock ticks */
+    const ModelVariable *variables;    /* value reference = index in this table; 0 is the time */
+    const char *const *state_names, *const *discrete_names, *const *margin_names;
+} Model;
+
+extern const Model model;
+
+#endif

@@ -1,0 +1,141 @@
+/* What the parts of the engine share; nobody else includes this. */
+#ifndef HYBRID_PARTS_H
+#define HYBRID_PARTS_H
+
+#include <stdint.h>
+
+#include "engine.h"
+
+#define N_STAGES 7            /* Dormand-Prince 5(4) */
+#define N_SAMPLES 12          /* where a step is looked at for crossings */
+#define N_ZENO_TIMES 12       /* remembered times of each jump */
+#define MESSAGE_SIZE 768
+
+/* Guards that cross within this time (s) are simultaneous.  A state outside the flow set by less
+   than this (in units of the margin), or that is back inside within this time, counts as inside. */
+#define EVENT_TOLERANCE 1e-9
+/* Width (s) to which a crossing is located, never less than 4 ulp of the time. */
+#define LOCATION_TOLERANCE 1e-14
+#define RELATIVE_TOLERANCE 1e-12
+#define ABSOLUTE_TOLERANCE 1e-14
+#define LOOK_AHEAD_STEPS 20000
+#define LOOK_AHEAD_TIME 1e6
+#define ADVANCE_STEPS 1000000
+#define TIME_EVENT_REPEATS 1000000
+
+/* A point of the run.  time, step, x and z lie one after the other in memory, so one copy moves
+   them all; step is the solver's proposal for the next step, 0 when there is none. */
+typedef struct {
+    double *time;
+    double *step;
+    double *x;
+    double *z;
+} Point;
+
+/* The solver's step from x0 at t0 to x1 at t1. */
+typedef struct {
+    double t0, t1;
+    const double *x0;
+    double *x1;
+    double *k[N_STAGES];
+    double *dense[3];         /* coefficients of the interpolation, made when first needed */
+    bool has_dense;
+} Step;
+
+typedef enum { PREDICTION_NONE, PREDICTION_EVENT, PREDICTION_RENEWAL, PREDICTION_QUIET } Prediction;
+
+/* The times of one jump, for the Zeno guard. */
+typedef struct {
+    double times[N_ZENO_TIMES];   /* distinct ones, the newest last */
+    double burst_start;
+    uint64_t total;
+    uint64_t stored;
+    uint64_t burst;
+} JumpHistory;
+
+/* The scalars that evolve. */
+typedef struct {
+    double relative_tolerance, absolute_tolerance;
+    double jumps_time;            /* the time that the next three count at */
+    uint64_t state_jumps_there;
+    uint64_t time_jumps_there;
+    uint64_t jumps_taken;
+    int32_t prediction;
+    int32_t ending;
+    char message[MESSAGE_SIZE];
+} Status;
+
+struct Engine {
+    const Model *model;
+    /* The block, and what lies in it. */
+    unsigned char *block;
+    size_t block_size;
+    void *wrapper;
+    size_t wrapper_size;
+    Status *status;
+    Point live, predicted;
+    double *u, *p;
+    JumpHistory *history;
+    unsigned char *ticked;
+    /* Scratch: nothing here outlives a call, except the cache of a view. */
+    unsigned char *scratch;
+    const double **arg;
+    double **res;
+    long long *iw;
+    double *w;
+    Step step;
+    double *probe_k[N_STAGES], *probe_x, *dense_x;
+    double *margins, *times, *samples, *outputs;
+    unsigned char *is_guard;      /* of each margin: some jump waits for it */
+    Point reset, shown;           /* result of a reset map; what a view shows */
+    View view;
+    bool has_outputs;
+    Ending problem;
+    size_t suspect;               /* the state that the solver blames */
+    char problem_message[MESSAGE_SIZE];
+};
+
+typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
+
+#if defined(__GNUC__)
+#define LIKE_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
+#define LIKE_PRINTF(text, first)
+#endif
+
+/* engine.c */
+/* Notes why something cannot be done; always false, so that callers can return it. */
+bool problem(Engine *engine, Ending ending, const char *format, ...) LIKE_PRINTF(3, 4);
+bool evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
+              double *second);
+double event_tolerance(double t);
+void copy_point(const Engine *engine, const Point *from, const Point *to);
+/* The values of a state for a message: "h = 0.1, v = -4.4". */
+const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size);
+
+/* integrate.c */
+/* Evaluates the flow at the point into step->k[0]. */
+bool step_begin(Engine *engine, const Point *point);
+/* One accepted step from the point towards `limit`, which it never passes; the result is in engine->step. */
+bool step_accept(Engine *engine, const Point *point, double limit);
+/* The point takes the end of the step. */
+void step_commit(Engine *engine, const Point *point);
+/* One step of the solver from the start of the present one to any time: engine->probe_x. */
+bool step_probe(Engine *engine, const Point *point, double t);
+/* The interpolation of the present step: engine->dense_x. */
+void step_dense(Engine *engine, double t);
+
+/* locate.c */
+/* Margins of the jumps at (t, x); false if one is not a number. */
+bool evaluate_margins(Engine *engine, double t, const double *x, const double *z);
+bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin);
+/* Whether the point may flow as far as the flow set says; *level is the margin to be kept. */
+bool flow_may_begin(Engine *engine, const Point *point, double *level);
+/* Looks for the first event on the present step; FLOW_EVENT moves the point there. */
+FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end);
+
+/* zeno.c */
+/* Records a jump of the live point at its time; false if it is one too many. */
+bool zeno_record(Engine *engine, size_t jump);
+
+#endif

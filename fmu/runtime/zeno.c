@@ -1,0 +1,81 @@
+/* The Zeno guard: what is counted for each jump on the state, and when a run stops.
+
+   (a) more jumps at one instant than any cascade needs; (b) gaps that shrink like a geometric
+   sequence whose rest is below the tolerance: the jumps accumulate; (c) a burst of jumps in
+   a time in which nothing but chattering can do that. */
+#include <math.h>
+
+#include "parts.h"
+
+#define N_GAPS 8                  /* gaps that must look geometric */
+#define LARGEST_RATIO 0.999
+#define RATIO_SPREAD 0.05
+#define REST_TOLERANCE 1e-6       /* s, times max(1, |t|) */
+#define JUMPS_AT_ONE_TIME 1000
+#define BURST_JUMPS 100
+#define BURST_TIME 1e-6           /* s */
+
+static void remember(JumpHistory *history, double t)
+{
+    history->total++;
+    if (history->stored > 0 && history->times[N_ZENO_TIMES - 1] == t)
+        return;
+    for (size_t i = 0; i + 1 < N_ZENO_TIMES; i++)
+        history->times[i] = history->times[i + 1];
+    history->times[N_ZENO_TIMES - 1] = t;
+    if (history->stored < N_ZENO_TIMES)
+        history->stored++;
+    if (history->burst == 0 || t - history->burst_start > BURST_TIME) {
+        history->burst_start = t;
+        history->burst = 0;
+    }
+    history->burst++;
+}
+
+/* Whether the newest gaps shrink geometrically: the last gap, and the last ratio. */
+static bool shrinking(const JumpHistory *history, double *gap, double *ratio)
+{
+    if (history->stored < N_GAPS + 1)
+        return false;
+    const double *times = history->times + (N_ZENO_TIMES - N_GAPS - 1);
+    double least = INFINITY, greatest = 0.0;
+    for (size_t i = 0; i + 1 < N_GAPS; i++) {
+        *gap = times[i + 2] - times[i + 1];
+        *ratio = *gap / (times[i + 1] - times[i]);
+        least = fmin(least, *ratio);
+        greatest = fmax(greatest, *ratio);
+    }
+    return greatest < LARGEST_RATIO && greatest - least < RATIO_SPREAD * greatest;
+}
+
+bool zeno_record(Engine *engine, size_t jump)
+{
+    JumpHistory *history = &engine->history[jump];
+    const char *name = engine->model->jumps[jump].name;
+    double t = *engine->live.time, gap = 0.0, ratio = 0.0;
+    unsigned long long total, there = engine->status->state_jumps_there, burst;
+    remember(history, t);
+    total = history->total;
+    burst = history->burst;
+    if (there > JUMPS_AT_ONE_TIME)
+        return problem(engine, ENDED_ZENO,
+                       "Zeno: %llu jumps at one instant, t = %.10g s, the last one '%s'. "
+                       "Remedy: let the jump leave its jump set, or give the jump set a minimum dwell time; a trigger "
+                       "whose two sides are both zero fires for ever unless its inequality is strict.",
+                       there, t, name);
+    if (shrinking(history, &gap, &ratio)) {
+        double rest = gap * ratio / (1.0 - ratio);
+        if (rest < REST_TOLERANCE * fmax(1.0, fabs(t)))
+            return problem(engine, ENDED_ZENO,
+                           "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "
+                           "ratio %.3f). Remedy: end the run before that time, or give the jump set a minimum dwell "
+                           "time.",
+                           total, name, t, t + rest, gap, ratio);
+    }
+    if (burst >= BURST_JUMPS)
+        return problem(engine, ENDED_ZENO,
+                       "Zeno: %llu jumps of '%s' in %.2g s around t = %.10g s. Remedy: end the run before that time, "
+                       "or give the jump set a minimum dwell time.",
+                       burst, name, t - history->burst_start, t);
+    return true;
+}
