@@ -126,7 +126,7 @@ def excitation_constants(
     norm = NormPrimitive(factor, weights, 0.0, starts[-1] + length)
 
     def integrals(at: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(np.einsum("re,se,qe->srq", factor, weights.integral(at, at + length), factor))
+        return np.asarray((factor * weights.integral(at, at + length)[:, None, :]) @ factor.T)
 
     return ExcitationConstants(
         window=length,

@@ -115,7 +115,10 @@ def _parse(source: str, content: bytes) -> Scenario:
         raise ScenarioError(f"{source} is not a text in UTF-8: byte {error.start} cannot be decoded.") from error
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{source} is not valid TOML: {error}.") from error
-    return read_scenario(entries)
+    try:
+        return read_scenario(entries)
+    except ScenarioError as error:
+        raise ScenarioError(f"{source}: {error}") from error
 
 
 def _subtable(top: Table, name: str, known: tuple[str, ...]) -> Table:

@@ -113,7 +113,7 @@ class ConstantWeight:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        _require("level", self.level, self.level >= 0, "must not be negative")
+        _require("the constant weight", self.level, self.level >= 0, "must not be negative")
 
     @property
     def carrier(self) -> UnitCarrier:

@@ -164,6 +164,15 @@ def test_norm_integral_agrees_with_adaptive_quadrature():
         assert primitive(np.array([end]))[0] == pytest.approx(total, abs=1e-9)
 
 
+def test_norm_integral_through_a_crossing_of_eigenvalues():
+    # Two edges on their own: the norm is max(4 sin^2 t, 1), with a kink at sin t = 1/2.
+    weights = EdgeWeights((GatedSine(0.5, 1.0, 100.0), ConstantWeight(1.0)), NoSwitching(2))
+    primitive = NormPrimitive(np.eye(2), weights, 0.0, math.pi / 2)
+    kink, end = math.pi / 6, math.pi / 2
+    expected = kink + 2 * (end - kink) + math.sin(2 * kink)  # 4 sin^2 = 2 - 2 cos 2t
+    assert primitive(np.array([end]))[0] == pytest.approx(expected, abs=1e-10)
+
+
 class TestFloquet:
     def test_constant_weights_decay_with_the_algebraic_connectivity(self):
         entries = {

@@ -98,6 +98,14 @@ class TestFiles:
         with pytest.raises(ScenarioError, match=r"broken.toml is not valid TOML: .*line 2"):
             load_scenario(file)
 
+    def test_a_broken_rule_tells_the_file(self, tmp_path):
+        file = tmp_path / "wrong.toml"
+        file.write_text("stop_tim = 3\n")
+        with pytest.raises(
+            ScenarioError, match=r"wrong.toml: the scenario has the unknown key 'stop_tim'. Did you mean"
+        ):
+            load_scenario(file)
+
     def test_a_file_that_is_not_text(self, tmp_path):
         file = tmp_path / "binary.toml"
         file.write_bytes(b'name = "\xff"')
@@ -201,7 +209,11 @@ class TestValues:
         ("weights.sine_rate", MISSING, "has no 'sine_rate'"),
         ("weights.duty_percent", 101, "duty_percent is 101.0; it must lie between 0 and 100"),
         ("weights.phase", "0", "phase is '0'; it must be a number"),
-        ("weights", {"kind": "constant", "value": -1.0}, "level is -1.0; it must not be negative"),
+        (
+            "weights",
+            {"kind": "constant", "value": -1.0},
+            r"\[weights\] of edge 1: the constant weight is -1.0; it must not be negative",
+        ),
         ("switching.dwell", 0.0, "dwell is 0.0; it must be a positive"),
         ("switching.dwell", MISSING, "has no 'dwell'"),
         ("switching.active", [], "active is empty"),

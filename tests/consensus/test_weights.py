@@ -112,8 +112,9 @@ class TestGatedSine:
         cuts = [t0, *wave.breakpoints(t0, t0 + span), t0 + span]
         total = 0.0
         for a, b in pairwise(cuts):
-            amplitude = float(wave.amplitude((a + b) / 2))
-            total += amplitude * quad(lambda t: float(wave.carrier.value(t)), a, b, epsabs=1e-11, limit=200)[0]
+            if wave.amplitude((a + b) / 2) == 0:
+                continue  # kinks behind a closed gate are no breakpoints
+            total += quad(lambda t: float(wave.carrier.value(t)), a, b, epsabs=1e-11, limit=200)[0]
         # Quadrature to 1e-11 on each piece; rounding of sin(rate*t) at rate*t up to 750 adds about 1e-13.
         assert float(wave.integral(t0, t0 + span)) == pytest.approx(total, abs=1e-10)
 
@@ -206,7 +207,7 @@ class TestConstantWeight:
 
     @pytest.mark.parametrize("level", [-0.1, math.nan, math.inf])
     def test_bad_levels_are_refused(self, level):
-        with pytest.raises(ValueError, match="level is"):
+        with pytest.raises(ValueError, match="the constant weight is"):
             ConstantWeight(level)
 
 
