@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.excitation import ExcitationConstants, Signal, scenario_excitation
-from hybrid_model.consensus.graphs import TreePartition
 from hybrid_model.consensus.scenario_data import Scenario
+from hybrid_model.consensus.spanning_trees import TreePartition
 
 __all__ = [
     "BoundForm",

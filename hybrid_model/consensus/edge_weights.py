@@ -6,9 +6,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hybrid_model.consensus.carriers import Carrier
 from hybrid_model.consensus.periods import common_period
 from hybrid_model.consensus.switching import Switching
-from hybrid_model.consensus.weights import Carrier, Waveform
+from hybrid_model.consensus.weights import Waveform
 
 __all__ = ["EdgeWeights", "Piece"]
 

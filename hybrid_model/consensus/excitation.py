@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from hybrid_model.consensus.edge_weights import EdgeWeights
-from hybrid_model.consensus.graphs import TreePartition, disagreement_basis, incidence
+from hybrid_model.consensus.graphs import disagreement_basis, incidence
 from hybrid_model.consensus.norm_integral import NormPrimitive
 from hybrid_model.consensus.scenario_data import Scenario
+from hybrid_model.consensus.spanning_trees import TreePartition
 
 __all__ = ["ExcitationConstants", "Signal", "excitation_constants", "scenario_excitation", "signal_factor"]
 

@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid_model.consensus.carriers import Carrier, SineCarrier
 from hybrid_model.consensus.edge_weights import EdgeWeights, Piece
-from hybrid_model.consensus.weights import Carrier, SineCarrier
 
 __all__ = ["NormPrimitive"]
 

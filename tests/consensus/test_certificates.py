@@ -16,8 +16,9 @@ from hybrid_model.consensus.certificates import (
     tree_free_rate,
 )
 from hybrid_model.consensus.excitation import Signal, scenario_excitation
-from hybrid_model.consensus.graphs import TreePartition, incidence
+from hybrid_model.consensus.graphs import incidence
 from hybrid_model.consensus.scenario import Trigger, TriggerKind, load_scenario, read_scenario
+from hybrid_model.consensus.spanning_trees import TreePartition
 
 
 def constant_network(agents, edges, initial, value=1.0, *, gain=1.0, threshold=0.5, decay=0.0, **more):
