@@ -108,7 +108,8 @@ def _run(command: Sequence[str], folder: Path, task: str) -> None:
     if done.returncode != 0:
         report = (done.stderr or done.stdout).strip()[-4000:]
         raise BuildError(
-            f"The compiler '{command[0]}' failed to {task} (status {done.returncode}). Remedy: see its report:\n{report}"
+            f"The compiler '{command[0]}' failed to {task} (status {done.returncode}). "
+            f"Remedy: correct what its report says:\n{report}"
         )
 
 
@@ -241,12 +242,14 @@ def package(content: Path | Mapping[str, bytes | Path], fmu_path: Path) -> Path:
             f"The FMU '{fmu_path.name}' has no modelDescription.xml; every FMU needs one at its top. "
             "Remedy: add the model description to the content."
         )
-    with _replacing(fmu_path) as temporary:
-        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-            for name in sorted(members):
-                entry = zipfile.ZipInfo(name, ARCHIVE_DATE)
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                entry.create_system = 3
-                entry.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
-                archive.writestr(entry, members[name])
+    with (
+        _replacing(fmu_path) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive,
+    ):
+        for name in sorted(members):
+            entry = zipfile.ZipInfo(name, ARCHIVE_DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.create_system = 3
+            entry.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
+            archive.writestr(entry, members[name])
     return fmu_path

@@ -186,7 +186,7 @@ def test_members_stay_inside_the_archive(tmp_path: Path, name: str) -> None:
 def test_description_is_required_and_the_old_archive_stays(tmp_path: Path) -> None:
     target = tmp_path / "M.fmu"
     target.write_bytes(b"old")
-    with pytest.raises(BuildError, match="no modelDescription.xml"):
+    with pytest.raises(BuildError, match=r"no modelDescription\.xml"):
         package({"readme.txt": b""}, target)
     with pytest.raises(BuildError, match="cannot be read"):
         package({"modelDescription.xml": tmp_path / "absent.xml"}, target)

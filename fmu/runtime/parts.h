@@ -103,15 +103,32 @@ typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
 #define LIKE_PRINTF(text, first)
 #endif
 
-/* engine.c */
+/* block.c */
 /* Notes why something cannot be done; always false, so that callers can return it. */
 bool problem(Engine *engine, Ending ending, const char *format, ...) LIKE_PRINTF(3, 4);
-bool evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
-              double *second);
-double event_tolerance(double t);
+/* The run is over for the reason noted last; always false. */
+bool end_run(Engine *engine);
+void copy_values(double *to, const double *from, size_t n);
 void copy_point(const Engine *engine, const Point *from, const Point *to);
 /* The values of a state for a message: "h = 0.1, v = -4.4". */
 const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size);
+
+/* values.c */
+/* Evaluates a function of the model at (t, x, z) with the present inputs and parameters. */
+bool evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
+              double *second);
+/* Something that the future depends on has changed. */
+void changed(Engine *engine);
+
+/* jumps.c */
+/* Copies the new state in engine->reset into the point if all of it is finite. */
+bool accept_state(Engine *engine, const char *source, const Point *point);
+bool apply_reset(Engine *engine, size_t jump, const Point *point);
+bool evaluate_times(Engine *engine, const Point *point);
+/* Takes the breakpoints of the flow that are due. */
+bool take_internal_jumps(Engine *engine, const Point *point);
+/* The first enabled visible jump at the point, n_jumps if there is none. */
+bool first_enabled(Engine *engine, const Point *point, size_t *jump);
 
 /* integrate.c */
 /* Evaluates the flow at the point into step->k[0]. */
@@ -126,6 +143,7 @@ bool step_probe(Engine *engine, const Point *point, double t);
 void step_dense(Engine *engine, double t);
 
 /* locate.c */
+double event_tolerance(double t);
 /* Margins of the jumps at (t, x); false if one is not a number. */
 bool evaluate_margins(Engine *engine, double t, const double *x, const double *z);
 bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin);

@@ -1,0 +1,203 @@
+/* The memory of an engine: the block that evolves, the scratch beside it, and messages. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "parts.h"
+
+bool problem(Engine *engine, Ending ending, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(engine->problem_message, sizeof engine->problem_message, format, arguments);
+    va_end(arguments);
+    engine->problem = ending;
+    return false;
+}
+
+/* The run is over for the reason noted last. */
+bool end_run(Engine *engine)
+{
+    engine->status->ending = (int32_t)engine->problem;
+    memcpy(engine->status->message, engine->problem_message, sizeof engine->problem_message);
+    return false;
+}
+
+static size_t append_values(char *text, size_t used, size_t size, size_t n, const char *const *names,
+                            const double *values)
+{
+    for (size_t i = 0; i < n && used + 1 < size; i++) {
+        int added = snprintf(text + used, size - used, "%s%s = %.10g", used ? ", " : "", names[i], values[i]);
+        used += added > 0 ? (size_t)added : 0;
+    }
+    return used;
+}
+
+const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size)
+{
+    const Model *m = engine->model;
+    text[0] = '\0';
+    size_t used = append_values(text, 0, size, m->n_states, m->state_names, x);
+    append_values(text, used, size, m->n_discrete, m->discrete_names, z);
+    return text;
+}
+
+Ending engine_ending(const Engine *engine)
+{
+    return (Ending)engine->status->ending;
+}
+
+const char *engine_message(const Engine *engine)
+{
+    return engine->status->message;
+}
+
+const char *engine_problem(const Engine *engine)
+{
+    return engine->problem_message;
+}
+
+/* Hands out pieces of one allocation; without memory it only counts. */
+typedef struct {
+    unsigned char *memory;
+    size_t used;
+} Cursor;
+
+static void *take(Cursor *cursor, size_t size)
+{
+    void *place = cursor->memory ? cursor->memory + cursor->used : NULL;
+    cursor->used += (size + 15) / 16 * 16;
+    return place;
+}
+
+static Point take_point(Cursor *cursor, const Model *m)
+{
+    double *values = take(cursor, (2 + m->n_states + m->n_discrete) * sizeof(double));
+    if (!values)
+        return (Point){NULL, NULL, NULL, NULL};
+    return (Point){values, values + 1, values + 2, values + 2 + m->n_states};
+}
+
+/* Lays out the block; called once with no memory, to learn the size. */
+static size_t lay_out_block(Engine *engine, unsigned char *memory)
+{
+    const Model *m = engine->model;
+    Cursor cursor = {memory, 0};
+    engine->wrapper = take(&cursor, engine->wrapper_size);
+    engine->status = take(&cursor, sizeof(Status));
+    engine->live = take_point(&cursor, m);
+    engine->predicted = take_point(&cursor, m);
+    engine->u = take(&cursor, m->n_inputs * sizeof(double));
+    engine->p = take(&cursor, m->n_parameters * sizeof(double));
+    engine->history = take(&cursor, m->n_jumps * sizeof(JumpHistory));
+    engine->ticked = take(&cursor, m->n_clocks);
+    return cursor.used;
+}
+
+static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
+{
+    const Model *m = engine->model;
+    size_t vector = m->n_states * sizeof(double), rows = m->n_margins + 1;
+    Cursor cursor = {memory, 0};
+    engine->arg = take(&cursor, (m->n_arg + MODEL_N_ARG) * sizeof(double *));
+    engine->res = take(&cursor, (m->n_res + 2) * sizeof(double *));
+    engine->iw = take(&cursor, m->n_iw * sizeof(long long));
+    engine->w = take(&cursor, m->n_w * sizeof(double));
+    engine->step.x1 = take(&cursor, vector);
+    for (size_t s = 0; s < N_STAGES; s++) {
+        engine->step.k[s] = take(&cursor, vector);
+        engine->probe_k[s] = take(&cursor, vector);
+    }
+    for (size_t i = 0; i < 3; i++)
+        engine->step.dense[i] = take(&cursor, vector);
+    engine->probe_x = take(&cursor, vector);
+    engine->dense_x = take(&cursor, vector);
+    engine->margins = take(&cursor, rows * sizeof(double));
+    engine->times = take(&cursor, m->n_times * sizeof(double));
+    engine->samples = take(&cursor, (N_SAMPLES + 1) * rows * sizeof(double));
+    engine->outputs = take(&cursor, m->n_outputs * sizeof(double));
+    engine->is_guard = take(&cursor, rows);
+    engine->reset = take_point(&cursor, m);
+    engine->shown = take_point(&cursor, m);
+    return cursor.used;
+}
+
+Engine *engine_create(const Model *m, size_t wrapper_size)
+{
+    Engine *engine = calloc(1, sizeof *engine);
+    if (!engine)
+        return NULL;
+    engine->model = m;
+    engine->wrapper_size = wrapper_size;
+    engine->block_size = lay_out_block(engine, NULL);
+    engine->block = calloc(1, engine->block_size);
+    engine->scratch = calloc(1, lay_out_scratch(engine, NULL));
+    if (!engine->block || !engine->scratch) {
+        engine_free(engine);
+        return NULL;
+    }
+    lay_out_block(engine, engine->block);
+    lay_out_scratch(engine, engine->scratch);
+    for (size_t j = 0; j < m->n_jumps; j++)
+        if (m->jumps[j].kind == JUMP_ON_STATE)
+            engine->is_guard[m->jumps[j].index] = 1;
+    engine_reset(engine);
+    return engine;
+}
+
+void engine_free(Engine *engine)
+{
+    if (!engine)
+        return;
+    free(engine->block);
+    free(engine->scratch);
+    free(engine);
+}
+
+void *engine_wrapper(Engine *engine)
+{
+    return engine->wrapper;
+}
+
+void copy_values(double *to, const double *from, size_t n)
+{
+    if (n > 0)
+        memcpy(to, from, n * sizeof(double));
+}
+
+void copy_point(const Engine *engine, const Point *from, const Point *to)
+{
+    copy_values(to->time, from->time, 2 + engine->model->n_states + engine->model->n_discrete);
+}
+
+void engine_reset(Engine *engine)
+{
+    const Model *m = engine->model;
+    memset(engine->block, 0, engine->block_size);
+    engine->status->relative_tolerance = RELATIVE_TOLERANCE;
+    engine->status->absolute_tolerance = ABSOLUTE_TOLERANCE;
+    copy_values(engine->live.x, m->x, m->n_states);
+    copy_values(engine->live.z, m->z, m->n_discrete);
+    copy_values(engine->u, m->u, m->n_inputs);
+    copy_values(engine->p, m->p, m->n_parameters);
+    engine->view = VIEW_NONE;
+    problem(engine, ENDED_NOT, "%s", "");
+}
+
+size_t engine_block_size(const Engine *engine)
+{
+    return engine->block_size;
+}
+
+void engine_save(const Engine *engine, void *block)
+{
+    memcpy(block, engine->block, engine->block_size);
+}
+
+void engine_restore(Engine *engine, const void *block)
+{
+    memcpy(engine->block, block, engine->block_size);
+    engine->view = VIEW_NONE;
+}

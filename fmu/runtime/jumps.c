@@ -1,0 +1,218 @@
+/* Jumps: which one is enabled, what it does, and how many there may be. */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "parts.h"
+
+bool engine_ticked(const Engine *engine, size_t clock)
+{
+    return engine->ticked[clock] != 0;
+}
+
+void engine_clear_ticks(Engine *engine)
+{
+    memset(engine->ticked, 0, engine->model->n_clocks);
+}
+
+size_t engine_jumps_taken(const Engine *engine)
+{
+    return (size_t)engine->status->jumps_taken;
+}
+
+/* Copies the new state into the point if all of it is finite. */
+bool accept_state(Engine *engine, const char *source, const Point *point)
+{
+    const Model *m = engine->model;
+    for (size_t i = 0; i < m->n_states + m->n_discrete; i++) {
+        const char *name = i < m->n_states ? m->state_names[i] : m->discrete_names[i - m->n_states];
+        if (!isfinite(engine->reset.x[i]))
+            return problem(engine, ENDED_NOT_FINITE,
+                           "'%s' becomes %g at t = %.17g by %s; states must be finite. Remedy: check that map and the "
+                           "parameters.",
+                           name, engine->reset.x[i], *point->time, source);
+    }
+    copy_values(point->x, engine->reset.x, m->n_states + m->n_discrete);
+    *point->step = 0.0;
+    return true;
+}
+
+bool apply_reset(Engine *engine, size_t jump, const Point *point)
+{
+    const ModelJump *entry = &engine->model->jumps[jump];
+    char source[MESSAGE_SIZE / 4];
+    if (!evaluate(engine, entry->reset, *point->time, point->x, point->z, engine->reset.x, engine->reset.z))
+        return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.", entry->name,
+                       *point->time);
+    snprintf(source, sizeof source, "the jump map of '%s'", entry->name);
+    return accept_state(engine, source, point);
+}
+
+bool evaluate_times(Engine *engine, const Point *point)
+{
+    const Model *m = engine->model;
+    if (m->n_times == 0)
+        return true;
+    if (!evaluate(engine, m->times, *point->time, point->x, point->z, engine->times, NULL))
+        return problem(engine, ENDED_FAILED, "The event times of '%s' could not be evaluated at t = %.17g.", m->name,
+                       *point->time);
+    for (size_t j = 0; j < m->n_jumps; j++)
+        if (m->jumps[j].kind == JUMP_ON_TIME && isnan(engine->times[m->jumps[j].index]))
+            return problem(engine, ENDED_NOT_FINITE,
+                           "The time of '%s' is not a number at t = %.17g; a time event needs a time (infinity: "
+                           "never). Remedy: check its expression and the parameters.",
+                           m->jumps[j].name, *point->time);
+    return true;
+}
+
+static bool stuck_in_time(Engine *engine, size_t jump, double t)
+{
+    return problem(engine, ENDED_FAILED,
+                   "The time event '%s' was taken %d times at t = %.17g s and is due again; its next time must lie "
+                   "after the present one. Remedy: let its jump map move the time on by more than rounding.",
+                   engine->model->jumps[jump].name, TIME_EVENT_REPEATS, t);
+}
+
+/* Takes the breakpoints of the flow that are due. */
+bool take_internal_jumps(Engine *engine, const Point *point)
+{
+    const Model *m = engine->model;
+    for (size_t repeats = 0;; repeats++) {
+        if (!evaluate_times(engine, point))
+            return false;
+        size_t j = 0;
+        while (j < m->n_jumps && !(m->jumps[j].kind == JUMP_ON_TIME && m->jumps[j].internal &&
+                                   engine->times[m->jumps[j].index] <= *point->time))
+            j++;
+        if (j == m->n_jumps)
+            return true;
+        if (repeats == TIME_EVENT_REPEATS)
+            return stuck_in_time(engine, j, *point->time);
+        if (!apply_reset(engine, j, point))
+            return false;
+    }
+}
+
+/* Whether a jump on the state may be taken where flow has priority: outside the flow set, or where
+   the flow leaves it at once. */
+static bool flow_is_over(Engine *engine, const Point *point, bool *over)
+{
+    double margin, later, soon = *point->time + event_tolerance(*point->time);
+    *over = false;
+    if (!engine->model->has_flow_set)
+        return true;
+    if (!evaluate_flow_set(engine, *point->time, point->x, point->z, &margin))
+        return false;
+    *over = margin < 0.0;
+    if (margin != 0.0)
+        return true;
+    if (!step_begin(engine, point) || !step_probe(engine, point, soon) ||
+        !evaluate_flow_set(engine, soon, engine->probe_x, point->z, &later))
+        return false;
+    *over = later < 0.0;
+    return true;
+}
+
+/* The first enabled visible jump at the point, n_jumps if there is none. */
+bool first_enabled(Engine *engine, const Point *point, size_t *jump)
+{
+    const Model *m = engine->model;
+    bool open = !m->flow_priority, asked = open;
+    *jump = m->n_jumps;
+    if (!evaluate_times(engine, point) || !evaluate_margins(engine, *point->time, point->x, point->z))
+        return false;
+    for (size_t j = 0; j < m->n_jumps; j++) {
+        const ModelJump *entry = &m->jumps[j];
+        bool due = entry->kind == JUMP_ON_TIME ? !entry->internal && engine->times[entry->index] <= *point->time
+                                               : engine->margins[entry->index] >= 0.0;
+        if (due && entry->kind == JUMP_ON_STATE && !asked) {
+            if (!flow_is_over(engine, point, &open))
+                return false;
+            asked = true;
+        }
+        if (due && (entry->kind == JUMP_ON_TIME || open)) {
+            *jump = j;
+            return true;
+        }
+    }
+    return true;
+}
+
+static void tick(Engine *engine, size_t jump)
+{
+    for (size_t c = 0; c < engine->model->n_clocks; c++)
+        if (engine->model->clock_jump[c] == jump)
+            engine->ticked[c] = 1;
+}
+
+/* Counts a visible jump; false if there are too many. */
+static bool count_jump(Engine *engine, size_t jump)
+{
+    Status *status = engine->status;
+    double t = *engine->live.time;
+    if (status->jumps_time != t) {
+        status->jumps_time = t;
+        status->state_jumps_there = status->time_jumps_there = 0;
+    }
+    status->jumps_taken++;
+    if (engine->model->jumps[jump].kind == JUMP_ON_TIME)
+        return ++status->time_jumps_there <= TIME_EVENT_REPEATS || stuck_in_time(engine, jump, t);
+    status->state_jumps_there++;
+    return zeno_record(engine, jump);
+}
+
+static bool take_jump(Engine *engine, size_t jump)
+{
+    changed(engine);
+    if (!apply_reset(engine, jump, &engine->live) || !take_internal_jumps(engine, &engine->live))
+        return end_run(engine);
+    tick(engine, jump);
+    return count_jump(engine, jump) || end_run(engine);
+}
+
+bool engine_start(Engine *engine)
+{
+    changed(engine);
+    if (!evaluate(engine, engine->model->start, *engine->live.time, engine->live.x, engine->live.z, engine->reset.x,
+                  engine->reset.z))
+        return problem(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.", engine->model->name);
+    return accept_state(engine, "its start value", &engine->live) && take_internal_jumps(engine, &engine->live);
+}
+
+size_t engine_pending(Engine *engine)
+{
+    size_t jump;
+    if (engine->status->ending != ENDED_NOT || !first_enabled(engine, &engine->live, &jump))
+        return engine->model->n_jumps;
+    return jump;
+}
+
+bool engine_jump(Engine *engine, bool *states_changed)
+{
+    size_t jump, n = engine->model->n_states;
+    *states_changed = false;
+    if (engine->status->ending != ENDED_NOT)
+        return false;
+    if (!take_internal_jumps(engine, &engine->live) || !first_enabled(engine, &engine->live, &jump))
+        return end_run(engine);
+    if (jump == engine->model->n_jumps)
+        return true;
+    copy_values(engine->dense_x, engine->live.x, n);
+    bool taken = take_jump(engine, jump);
+    for (size_t i = 0; i < n; i++)
+        *states_changed = *states_changed || engine->dense_x[i] != engine->live.x[i];
+    return taken;
+}
+
+bool engine_jump_all(Engine *engine)
+{
+    while (engine->status->ending == ENDED_NOT) {
+        size_t jump;
+        if (!first_enabled(engine, &engine->live, &jump))
+            return end_run(engine);
+        if (jump == engine->model->n_jumps)
+            return true;
+        take_jump(engine, jump);
+    }
+    return false;
+}
