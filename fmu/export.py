@@ -9,15 +9,13 @@ from pathlib import Path
 
 from fmpy import platform_tuple, sharedLibraryExtension
 
-from fmu.build import compile_fmu, package
+from fmu.build import RUNTIME, compile_fmu, fmi_headers, package, runtime_sources
 from fmu.code import model_code
 from fmu.description import model_description, model_identifier
 from fmu.errors import ExportError
 from fmu.trace import trace
 from fmu.variables import fmu_variables
 from hybrid_model import Automaton
-
-RUNTIME = Path(__file__).parent / "runtime"
 
 
 class Fmi(enum.Enum):
@@ -69,7 +67,7 @@ def export_fmu(
         generated = work / "model.c"
         generated.write_text(model_code(traced, variables, token), encoding="ascii")
         binary = work / f"{identifier}{sharedLibraryExtension}"
-        compile_fmu([generated], sorted(RUNTIME.glob("*.c")), binary)
+        compile_fmu([generated, *runtime_sources()], [fmi_headers()], binary)
         members = {
             "modelDescription.xml": model_description(traced, variables, token, stop_time),
             f"binaries/{platform_tuple}/{binary.name}": binary.read_bytes(),

@@ -205,7 +205,9 @@ class _Scopes:
     def wired(self, wire: _Wire) -> Value:
         """Return the value that arrives over a wire."""
         values = [self._source(part, variable) for part, variable in wire.sources]
-        return np.stack(values) if wire.stacked else values[0]
+        if not wire.stacked:
+            return values[0]
+        return np.stack(values) if values else np.zeros(0)
 
     def _source(self, part: str, variable: str) -> Value:
         if (part, variable) in self._composition._computed:
