@@ -23,7 +23,8 @@ enum {
 typedef struct {
     double time;               /* the communication point */
     double stop_time;          /* infinite if there is none */
-    int mode;
+    int32_t mode;
+    int32_t end_reported;      /* fmi3DoStep has said that the run is over */
 } Run;
 
 typedef struct {
@@ -126,6 +127,7 @@ static void set_up(Instance *instance)
     instance->run->mode = MODE_INSTANTIATED;
     instance->run->time = 0.0;
     instance->run->stop_time = INFINITY;
+    instance->run->end_reported = false;
 }
 
 static bool is_blank(const char *text)
@@ -572,7 +574,7 @@ static fmi3Status check_step(const Instance *instance, double point, double size
 {
     const Run *run = instance->run;
     const char *name = instance->name;
-    if (engine_ending(instance->engine) != ENDED_NOT)
+    if (run->end_reported)
         return refuse(instance, "%s: the run is over: %s", name, engine_message(instance->engine));
     if (!isfinite(size) || size <= 0.0)
         return refuse(instance, "%s: fmi3DoStep: the step size %g must be finite and above zero.", name, size);
@@ -620,6 +622,7 @@ fmi3Status fmi3DoStep(fmi3Instance handle, fmi3Float64 currentCommunicationPoint
     *earlyReturn = instance->early_return_allowed && run->time < target;
     if (advance == ADVANCE_ENDED) {
         *eventHandlingNeeded = false;
+        run->end_reported = true;
         refuse(instance, "%s: %s", instance->name, engine_message(engine));
     }
     /* The call itself succeeded: it computed what there is, and says by its flags that it is the end. */
