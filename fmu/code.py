@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -12,7 +13,7 @@ from fmu.variables import Bank, FmuVariable
 from hybrid_model.automaton import Priority, Trigger
 from hybrid_model.variables import Kind
 
-_OPTIONS = {
+_OPTIONS: dict[str, Any] = {
     "with_header": False,
     "with_export": False,
     "cpp": False,

@@ -70,7 +70,8 @@ def model_description(
         _variable(listed, reference, variable)
     _structure(root, traced, variables)
     ET.indent(root)
-    return ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+    xml: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    return xml + b"\n"
 
 
 def _first_line(automaton: Automaton) -> str:

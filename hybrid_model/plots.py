@@ -1,18 +1,20 @@
-"""Plots of runs on hybrid time. Every function draws into the axes that it is given, or into new ones, and returns them."""
+"""Plots of runs on hybrid time: every function draws into the axes given, or into new ones, and returns them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.typing import RcKeyType
 
 from hybrid_model.arc import HybridArc
 from hybrid_model.variables import FloatArray
 
-JOURNAL = {
+JOURNAL: dict[RcKeyType, Any] = {
     "font.family": "serif",
     "mathtext.fontset": "cm",
     "font.size": 9,
@@ -44,7 +46,7 @@ def new_axes(ax: Axes | None) -> Axes:
 def curve(
     arc: HybridArc, name: str, t_start: float | None = None, t_end: float | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return times and values of a scalar variable for drawing: a fine grid, the solver's steps, and both sides of every jump.
+    """Return times and values of a variable for drawing: a fine grid, the solver's steps, both sides of every jump.
 
     Parameters
     ----------

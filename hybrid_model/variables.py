@@ -297,7 +297,7 @@ def unknown_name(owner: str, name: str, known: Mapping[str, Any]) -> str:
 
 
 def element_names(variable: Variable) -> list[str]:
-    """Return the names of a variable's scalars, counted from 1: ``x``, or ``w[1]``, ``w[2]``; row by row, ``m[2,1]``."""
+    """Return the names of a variable's scalars, counted from 1: ``x``; ``w[1]``, ``w[2]``; row by row ``m[2,1]``."""
     if not variable.shape:
         return [variable.name]
     indices = np.ndindex(*variable.shape)

@@ -71,11 +71,12 @@ def _as_network(scenario: Scenario, interval: float) -> tuple[RunReport, Any, di
 
 
 def _text(scenario: Scenario, report: RunReport) -> str:
+    agents = ", ".join(map(str, report.events_per_agent))
     gap = "none" if report.min_gap is None else f"{report.min_gap:.6g} s"
     return "\n".join(
         [
             f"{scenario.name}: {report.message}",
-            f"  events          {sum(report.events_per_agent)} (per agent {', '.join(map(str, report.events_per_agent))})",
+            f"  events          {sum(report.events_per_agent)} (per agent {agents})",
             f"  shortest gap    {gap}",
             f"  final states    {', '.join(f'{x:.9g}' for x in report.x_end)}",
             f"  |x_e| at end    {report.edge_norm_end:.6g}",

@@ -42,7 +42,7 @@ def plot_states(scenario: Scenario, arc: HybridArc, ax: Axes | None = None) -> A
         ax.plot(*curve(arc, f"{name}.x"), color=color, label=f"$x_{{{i}}}$")
         times = arc.event_times(f"{name}.trigger.broadcast")
         ax.plot(times, arc.at(f"{name}.x", times), linestyle="none", marker="o", markersize=2.2, color=color)
-    ax.axhline(np.mean(scenario.network.initial), color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0)
+    ax.axhline(float(np.mean(scenario.network.initial)), color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0)
     ax.set_xlabel("time $t$ (s)")
     ax.set_ylabel("states $x_i$")
     ax.set_xlim(0.0, scenario.stop_time)

@@ -1,0 +1,207 @@
+"""Masters: exact instants, bounded iteration, time by index, and what faulty slaves may not do to a run."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
+from cosim.errors import CosimError
+from cosim.masters import run_event_exact, run_fixed_step
+from cosim.result import Ended
+from cosim.slave import Step, Update
+from cosim.system import System
+from hybrid_model.models import BouncingBall
+
+
+class Ramp(hm.HybridAutomaton):
+    """Rises at a rate; at `level` it starts anew and sends how often it has done so."""
+
+    x = hm.State(0.0, output=True)
+    sent = hm.DiscreteState(0.0, output=True)
+    rate = hm.Parameter(1.0)
+    level = hm.Parameter(1.0)
+    ticks = hm.Clock("jump")
+
+    def flow_map(self, s):
+        return {"x": s.rate}
+
+    def jump_set(self, s):
+        return s.x - s.level
+
+    def jump_map(self, s):
+        return {"x": 0.0, "sent": s.sent + 1}
+
+
+class Relay(hm.HybridAutomaton):
+    """Passes on, at the instant of its arrival, what it receives."""
+
+    received = hm.Input(0.0, discrete=True)
+    sent = hm.DiscreteState(0.0, output=True)
+    ticks = hm.Clock("jump")
+
+    def jump_set(self, s):
+        return np.abs(s.received - s.sent) - 0.5
+
+    def jump_map(self, s):
+        return {"sent": s.received}
+
+
+class Follower(hm.HybridAutomaton):
+    """Jumps where a continuous input and its own state meet: it cannot know its next event beforehand."""
+
+    felt = hm.Input(0.0)
+    x = hm.State(0.0, output=True)
+    met = hm.DiscreteState(0.0, output=True)
+    ticks = hm.Clock("jump")
+
+    def flow_map(self, s):
+        return {"x": s.felt}
+
+    def jump_set(self, s):
+        return s.x - 1.0
+
+    def jump_map(self, s):
+        return {"x": 0.0, "met": s.met + 1}
+
+
+def slaves(*named):
+    return [AutomatonSlave(name, automaton) for name, automaton in named]
+
+
+def test_a_signal_runs_through_a_chain_at_one_instant():
+    chain = slaves(("a", Ramp()), ("b", Relay()), ("c", Relay()), ("d", Relay()))
+    wires = {"b.received": "a.sent", "c.received": "b.sent", "d.received": "c.sent"}
+    result = run_event_exact(System(chain, wires), 2.5)
+    assert [tick.slave for tick in result.ticks] == ["a", "b", "c", "d"] * 2
+    np.testing.assert_allclose([tick.t for tick in result.ticks], [1.0] * 4 + [2.0] * 4, rtol=0, atol=1e-12)
+
+
+def test_the_start_values_run_through_a_chain_whatever_its_order():
+    class Passing(hm.HybridAutomaton):
+        into = hm.Input(0.0, discrete=True)
+        out = hm.Output(discrete=True)
+
+        def outputs(self, s):
+            return {"out": s.into + 1.0}
+
+    named = [(name, Passing()) for name in "abcd"]
+    wires = {"a.into": "b.out", "b.into": "c.out", "c.into": "d.out"}
+    result = run_event_exact(System(slaves(*named), wires), 1.0, output_interval=1.0)
+    assert [result.signals[f"{name}.out"][0] for name in "dcba"] == [1.0, 2.0, 3.0, 4.0]
+
+
+def test_only_the_slave_that_fires_and_its_receivers_are_stepped():
+    """50 ramps that nobody listens to and that do not fire cost one step each, for the stop time."""
+    idle = [(f"idle{k}", Ramp(rate=0.01)) for k in range(50)]
+    system = System(slaves(("a", Ramp()), ("b", Relay()), *idle), {"b.received": "a.sent"})
+    result = run_event_exact(system, 9.5)
+    assert len(result.tick_times("a", "ticks")) == 9
+    # a and b: one step each per event, and one for the stop time.
+    assert result.steps <= 50 + 2 * (9 + 1)
+
+
+def test_simultaneous_events_that_rounding_separates_are_handled_at_one_instant():
+    """Ramps of rate 0.1 and 0.3 from different starts reach their levels at t = 1 by different sums."""
+    system = System(slaves(("a", Ramp(rate=0.1, level=0.1)), ("b", Ramp(rate=0.3, level=0.3))), {})
+    result = run_event_exact(system, 3.5)
+    times = {name: result.tick_times(name, "ticks") for name in "ab"}
+    np.testing.assert_array_equal(times["a"], times["b"])
+    np.testing.assert_allclose(times["a"], [1.0, 2.0, 3.0], rtol=0, atol=1e-9)
+
+
+def test_a_slave_that_cannot_predict_is_stopped_at_its_event_and_others_are_not_beyond_it():
+    """Two followers are stepped to the same horizon; the first to jump sends the other back to that instant."""
+    system = System(
+        slaves(("slow", Follower(felt=0.4)), ("fast", Follower(felt=0.7)), ("r", Relay())), {"r.received": "fast.met"}
+    )
+    result = run_event_exact(system, 5.0)
+    np.testing.assert_allclose(result.tick_times("slow", "ticks"), [2.5, 5.0], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(result.tick_times("fast", "ticks"), [1 / 0.7, 2 / 0.7, 3 / 0.7], rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(result.tick_times("r", "ticks"), result.tick_times("fast", "ticks"))
+
+
+def test_zeno_ends_the_run_with_the_time_of_the_accumulation():
+    result = run_event_exact(System(slaves(("ball", BouncingBall())), {}), 5.0)
+    assert result.ended is Ended.TERMINATED
+    assert "accumulate at t = 2.5586" in result.message
+    assert result.t == pytest.approx(np.sqrt(2 / 9.81) * 1.7 / 0.3, abs=1e-3)
+
+
+def test_communication_points_are_computed_from_their_index():
+    """0.001 s summed 256 040 times is wrong in the tenth digit; the index is exact."""
+    points = []
+
+    class Watching(AutomatonSlave):
+        def step(self, t, t_next):
+            points.append((t, t_next))
+            return Step(t_next, False)
+
+    run_fixed_step(System([Watching("a", Ramp())], {}), 2.5604, 0.001)
+    assert [t_next for _, t_next in points[:-1]] == [(k + 1) * 0.001 for k in range(2560)]
+    assert points[-1][1] == 2.5604
+    assert all(a[1] == b[0] for a, b in pairwise(points))
+
+
+@pytest.mark.parametrize("step", [0.0, -0.1, float("nan"), float("inf")])
+def test_impossible_steps_are_refused(step):
+    with pytest.raises(CosimError, match="communication step is"):
+        run_fixed_step(System(slaves(("a", Ramp())), {}), 1.0, step)
+
+
+def test_the_order_of_slaves_does_not_matter_to_the_fixed_step_master():
+    def final(order):
+        named = {"a": Ramp(rate=0.7), "b": Relay(), "c": Relay()}
+        system = System(
+            slaves(*((name, named[name]) for name in order)), {"b.received": "a.sent", "c.received": "b.sent"}
+        )
+        return run_fixed_step(system, 4.0, 0.1).final
+
+    assert final("abc") == final("cba") == final("bca")
+
+
+class Faulty(AutomatonSlave):
+    """A slave that does not do what it should; `fault` says what."""
+
+    def __init__(self, fault):
+        super().__init__("faulty", Ramp())
+        self.fault = fault
+
+    def update(self):
+        update = super().update()
+        if self.fault == "endless":
+            return Update(True)
+        if self.fault == "past":
+            return Update(False, (), -1.0)
+        return update
+
+    def step(self, t, t_next):
+        step = super().step(t, t_next)
+        if self.fault == "beyond":
+            return Step(t_next + 1.0, False)
+        if self.fault == "backward":
+            return Step(t - 1.0, True)
+        return step
+
+
+@pytest.mark.parametrize(
+    ("fault", "sentence"),
+    [
+        ("endless", "faulty asks for more than 10000 event iterations at t = 0"),
+        ("past", "its next event is at -1 s: that is not ahead"),
+        ("beyond", "outside the step"),
+        ("backward", "outside the step"),
+    ],
+)
+def test_faulty_slaves_are_named_and_the_run_ends(fault, sentence):
+    with pytest.raises(CosimError, match=sentence):
+        run_event_exact(System([Faulty(fault)], {}), 3.0)
+
+
+def test_slaves_are_closed_when_a_run_fails():
+    faulty = Faulty("beyond")
+    with pytest.raises(CosimError):
+        run_event_exact(System([faulty], {}), 3.0)
+    with pytest.raises(CosimError, match="has not been started"):
+        faulty.get("x")

@@ -1,0 +1,71 @@
+"""Wiring is checked before anything runs, and refused with both names."""
+
+import pytest
+
+import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
+from cosim.errors import MisfitError
+from cosim.masters import run_event_exact
+from cosim.system import System
+
+
+class Sender(hm.HybridAutomaton):
+    position = hm.State(0.0, unit="m", output=True)
+    hidden = hm.State(0.0)
+    sent = hm.DiscreteState(0.0, unit="m", output=True)
+
+    def flow_map(self, s):
+        return {"position": 1.0, "hidden": 0.0}
+
+
+class Receiver(hm.HybridAutomaton):
+    received = hm.Input(0.0, unit="m", discrete=True)
+    felt = hm.Input(0.0)
+    seconds = hm.Input(0.0, unit="s")
+    gain = hm.Input(0.0)
+    gain2 = hm.Input(0.0)
+
+
+def wire(connections):
+    return System([AutomatonSlave("sender", Sender()), AutomatonSlave("receiver", Receiver())], connections)
+
+
+def test_signals_that_fit_are_connected():
+    system = wire({"receiver.received": "sender.sent", "receiver.felt": "sender.position"})
+    assert [str(connection) for connection in system.connections] == [
+        "sender.sent -> receiver.received",
+        "sender.position -> receiver.felt",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("target", "source", "sentence"),
+    [
+        ("receiver.received", "sender.position", "may change only at events"),
+        ("receiver.seconds", "sender.position", "is in 'm', but receiver.seconds is in 's'"),
+        ("receiver.gian", "sender.position", "not an input; the inputs of receiver are received, felt"),
+        ("receiver.felt", "sender.hidden", "not an output; the outputs of sender are position, sent"),
+        ("nobody.felt", "sender.position", "names no slave; the slaves are sender, receiver"),
+        ("sender.position", "sender.sent", "not an input"),
+    ],
+)
+def test_signals_that_do_not_fit_are_refused(target, source, sentence):
+    with pytest.raises(MisfitError, match=sentence):
+        wire({target: source})
+
+
+def test_names_that_begin_alike_are_told_apart():
+    system = wire({"receiver.gain2": "sender.position"})
+    assert system.connections[0].input == "gain2"
+
+
+def test_two_slaves_of_one_name_are_refused():
+    with pytest.raises(MisfitError, match="two slaves have one name"):
+        System([AutomatonSlave("a", Sender()), AutomatonSlave("a", Receiver())], {})
+
+
+def test_event_exact_master_refuses_a_signal_that_changes_along_flows():
+    with pytest.raises(
+        MisfitError, match=r"sender.position -> receiver.felt carries a signal that changes along flows"
+    ):
+        run_event_exact(wire({"receiver.felt": "sender.position"}), 1.0)
