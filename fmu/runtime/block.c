@@ -7,12 +7,26 @@
 
 #include "parts.h"
 
+void end_text_cleanly(char *text)
+{
+    size_t size = strlen(text), tail = 0;
+    while (tail < size && tail < 3 && ((unsigned char)text[size - 1 - tail] & 0xC0) == 0x80)
+        tail++;
+    if (tail == size)
+        return;
+    unsigned char lead = (unsigned char)text[size - 1 - tail];
+    size_t wanted = lead >= 0xF0 ? 3 : lead >= 0xE0 ? 2 : lead >= 0xC0 ? 1 : 0;
+    if (wanted > tail)
+        text[size - 1 - tail] = '\0';
+}
+
 bool problem(Engine *engine, Ending ending, const char *format, ...)
 {
     va_list arguments;
     va_start(arguments, format);
     vsnprintf(engine->problem_message, sizeof engine->problem_message, format, arguments);
     va_end(arguments);
+    end_text_cleanly(engine->problem_message);
     engine->problem = ending;
     return false;
 }
@@ -41,6 +55,7 @@ const char *describe_state(const Engine *engine, const double *x, const double *
     text[0] = '\0';
     size_t used = append_values(text, 0, size, m->n_states, m->state_names, x);
     append_values(text, used, size, m->n_discrete, m->discrete_names, z);
+    end_text_cleanly(text);
     return text;
 }
 

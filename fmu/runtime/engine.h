@@ -89,6 +89,9 @@ const char *engine_message(const Engine *engine);
 /* Why the last call that failed did so, also when the run is not over. */
 const char *engine_problem(const Engine *engine);
 
+/* Drops what truncation left of a UTF-8 character at the end of a text. */
+void end_text_cleanly(char *text);
+
 /* The distance from |t| to the next larger double. */
 double time_ulp(double t);
 

@@ -8,33 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "engine.h"
-#include "fmi3Functions.h"
-
-enum {
-    MODE_INSTANTIATED = 1,
-    MODE_INITIALIZATION = 2,
-    MODE_EVENT = 4,
-    MODE_STEP = 8,
-    MODE_TERMINATED = 16,
-    MODE_ANY = 31
-};
-
-typedef struct {
-    double time;               /* the communication point */
-    double stop_time;          /* infinite if there is none */
-    int32_t mode;
-    int32_t end_reported;      /* fmi3DoStep has said that the run is over */
-} Run;
-
-typedef struct {
-    Engine *engine;
-    Run *run;
-    char *name;
-    fmi3InstanceEnvironment environment;
-    fmi3LogMessageCallback log;
-    bool event_mode_used, early_return_allowed;
-} Instance;
+#include "fmi3_instance.h"
 
 /* A saved state: a mark to recognise it by, and the engine's block. */
 typedef struct {
@@ -43,18 +17,9 @@ typedef struct {
     unsigned char block[];
 } SavedState;
 
-#if defined(__GNUC__)
-#define LIKE_PRINTF(text, first) __attribute__((format(printf, text, first)))
-#else
-#define LIKE_PRINTF(text, first)
-#endif
-
 /* ---- logging and calling rules ---- */
 
-/* Errors are always logged when there is a logger; always fmi3Error, so that callers can return it. */
-static fmi3Status refuse(const Instance *instance, const char *format, ...) LIKE_PRINTF(2, 3);
-
-static fmi3Status refuse(const Instance *instance, const char *format, ...)
+fmi3Status refuse(const Instance *instance, const char *format, ...)
 {
     char message[1024];
     va_list arguments;
@@ -63,11 +28,12 @@ static fmi3Status refuse(const Instance *instance, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
+    end_text_cleanly(message);
     instance->log(instance->environment, fmi3Error, "logStatusError", message);
     return fmi3Error;
 }
 
-static const char *mode_name(int mode)
+const char *mode_name(int mode)
 {
     switch (mode) {
     case MODE_INSTANTIATED: return "Instantiated";
@@ -78,8 +44,7 @@ static const char *mode_name(int mode)
     }
 }
 
-/* The instance, if the function may be called now; NULL (and one log line) otherwise. */
-static Instance *enter(fmi3Instance handle, const char *function, int modes)
+Instance *enter(fmi3Instance handle, const char *function, int modes)
 {
     Instance *instance = handle;
     if (!instance)
@@ -91,13 +56,7 @@ static Instance *enter(fmi3Instance handle, const char *function, int modes)
     return NULL;
 }
 
-static fmi3Status unsupported(fmi3Instance handle, const char *function)
-{
-    Instance *instance = handle;
-    return refuse(instance, "%s: %s is not supported by this FMU.", instance ? instance->name : "", function);
-}
-
-static fmi3Status null_argument(const Instance *instance, const char *function)
+fmi3Status null_argument(const Instance *instance, const char *function)
 {
     return refuse(instance, "%s: %s was called with a null pointer; every argument needs a place to point to.",
                   instance->name, function);
@@ -284,177 +243,6 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance handle)
     return fmi3OK;
 }
 
-/* ---- values ---- */
-
-static const char *type_name(Type type)
-{
-    static const char *const NAMES[] = {"Float64", "Int32", "Boolean", "Clock"};
-    return NAMES[type];
-}
-
-static bool may_be_set(const ModelVariable *variable, int mode)
-{
-    bool before_start = (mode & (MODE_INSTANTIATED | MODE_INITIALIZATION)) != 0;
-    switch (variable->bank) {
-    case BANK_INPUT: return true;
-    case BANK_PARAMETER: return before_start;
-    case BANK_STATE:
-    case BANK_DISCRETE: return before_start && !variable->calculated;
-    default: return false;
-    }
-}
-
-/* Checks the arguments of a getter or setter before anything is written. */
-static fmi3Status check_access(const Instance *instance, const char *function, Type type, bool set,
-                               const fmi3ValueReference references[], size_t n, const void *values, size_t n_values)
-{
-    if (n_values != n)
-        return refuse(instance, "%s: %s: %zu values for %zu variables; all variables are scalars.", instance->name,
-                      function, n_values, n);
-    if (n > 0 && (!references || !values))
-        return null_argument(instance, function);
-    for (size_t i = 0; i < n; i++) {
-        if (references[i] >= model.n_variables)
-            return refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name,
-                          function, (unsigned long)references[i]);
-        const ModelVariable *variable = &model.variables[references[i]];
-        if (variable->type != type)
-            return refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.",
-                          instance->name, function, variable->name, type_name(variable->type));
-        if (set && !may_be_set(variable, instance->run->mode))
-            return refuse(instance, "%s: %s: '%s' cannot be set in the state '%s'.", instance->name, function,
-                          variable->name, mode_name(instance->run->mode));
-    }
-    return fmi3OK;
-}
-
-static View view_of(int mode)
-{
-    if (mode & (MODE_INSTANTIATED | MODE_INITIALIZATION))
-        return VIEW_START;
-    return mode == MODE_EVENT ? VIEW_PENDING : VIEW_LIVE;
-}
-
-/* The value of a variable, if it is one that its type can hold. */
-static bool read_value(const Instance *instance, const ModelVariable *variable, double *value)
-{
-    if (variable->bank == BANK_TIME) {
-        *value = instance->run->time;
-        return true;
-    }
-    const double *values = engine_values(instance->engine, view_of(instance->run->mode), variable->bank);
-    if (!values) {
-        refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, variable->name,
-               engine_problem(instance->engine));
-        return false;
-    }
-    *value = values[variable->index];
-    if (variable->type == TYPE_INT32)
-        *value = floor(*value + 0.5);
-    if (isfinite(*value) && (variable->type != TYPE_INT32 || fabs(*value + 0.5) <= 2147483647.5))
-        return true;
-    refuse(instance, "%s: '%s' is %g at t = %.17g, which a value of type %s must not be. Remedy: check its expression, "
-           "the parameters and the inputs.",
-           instance->name, variable->name, values[variable->index], instance->run->time, type_name(variable->type));
-    return false;
-}
-
-/* Checks everything about a getter's call, down to each value: then nothing is written by halves. */
-static fmi3Status check_get(const Instance *instance, const char *function, Type type,
-                            const fmi3ValueReference references[], size_t n, const void *values, size_t n_values)
-{
-    double value;
-    fmi3Status status = check_access(instance, function, type, false, references, n, values, n_values);
-    for (size_t i = 0; i < n && status == fmi3OK; i++)
-        if (!read_value(instance, &model.variables[references[i]], &value))
-            status = fmi3Error;
-    return status;
-}
-
-#define DEFINE_GET(TYPE, MODEL_TYPE, CONVERT)                                                                          \
-    fmi3Status fmi3Get##TYPE(fmi3Instance handle, const fmi3ValueReference valueReferences[],                          \
-                             size_t nValueReferences, fmi3##TYPE values[], size_t nValues)                             \
-    {                                                                                                                  \
-        const char *function = "fmi3Get" #TYPE;                                                                        \
-        Instance *instance = enter(handle, function, MODE_ANY);                                                        \
-        double value = 0.0;                                                                                            \
-        if (!instance || check_get(instance, function, MODEL_TYPE, valueReferences, nValueReferences, values,          \
-                                   nValues) != fmi3OK)                                                                 \
-            return fmi3Error;                                                                                          \
-        for (size_t i = 0; i < nValueReferences; i++) {                                                                \
-            read_value(instance, &model.variables[valueReferences[i]], &value);                                        \
-            values[i] = CONVERT;                                                                                       \
-        }                                                                                                              \
-        return fmi3OK;                                                                                                 \
-    }
-
-DEFINE_GET(Float64, TYPE_FLOAT64, value)
-DEFINE_GET(Int32, TYPE_INT32, (fmi3Int32)value)
-DEFINE_GET(Boolean, TYPE_BOOLEAN, value != 0.0)
-
-/* The modes in which anything at all can be set. */
-#define MODE_SETTABLE (MODE_INSTANTIATED | MODE_INITIALIZATION | MODE_EVENT | MODE_STEP)
-
-static void write_value(const Instance *instance, fmi3ValueReference reference, double value)
-{
-    const ModelVariable *variable = &model.variables[reference];
-    engine_set(instance->engine, variable->bank, variable->index, value);
-}
-
-fmi3Status fmi3SetFloat64(fmi3Instance handle, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                          const fmi3Float64 values[], size_t nValues)
-{
-    const char *function = "fmi3SetFloat64";
-    Instance *instance = enter(handle, function, MODE_SETTABLE);
-    if (!instance || check_access(instance, function, TYPE_FLOAT64, true, valueReferences, nValueReferences, values,
-                                  nValues) != fmi3OK)
-        return fmi3Error;
-    for (size_t i = 0; i < nValueReferences; i++)
-        if (!isfinite(values[i]))
-            return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function,
-                          values[i], model.variables[valueReferences[i]].name);
-    for (size_t i = 0; i < nValueReferences; i++)
-        write_value(instance, valueReferences[i], values[i]);
-    return fmi3OK;
-}
-
-#define DEFINE_SET(TYPE, MODEL_TYPE, CONVERT)                                                                          \
-    fmi3Status fmi3Set##TYPE(fmi3Instance handle, const fmi3ValueReference valueReferences[],                          \
-                             size_t nValueReferences, const fmi3##TYPE values[], size_t nValues)                       \
-    {                                                                                                                  \
-        const char *function = "fmi3Set" #TYPE;                                                                        \
-        Instance *instance = enter(handle, function, MODE_SETTABLE);                                                   \
-        if (!instance || check_access(instance, function, MODEL_TYPE, true, valueReferences, nValueReferences,         \
-                                      values, nValues) != fmi3OK)                                                      \
-            return fmi3Error;                                                                                          \
-        for (size_t i = 0; i < nValueReferences; i++)                                                                  \
-            write_value(instance, valueReferences[i], CONVERT);                                                        \
-        return fmi3OK;                                                                                                 \
-    }
-
-DEFINE_SET(Int32, TYPE_INT32, (double)values[i])
-DEFINE_SET(Boolean, TYPE_BOOLEAN, values[i] ? 1.0 : 0.0)
-
-/* Clocks tick in Event Mode only: the clock of the jump that comes next at this instant, and in the
-   first iteration those whose jumps were taken inside the last fmi3DoStep. */
-fmi3Status fmi3GetClock(fmi3Instance handle, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                        fmi3Clock values[])
-{
-    const char *function = "fmi3GetClock";
-    Instance *instance = enter(handle, function, MODE_ANY);
-    if (!instance || check_access(instance, function, TYPE_CLOCK, false, valueReferences, nValueReferences, values,
-                                  nValueReferences) != fmi3OK)
-        return fmi3Error;
-    bool in_event_mode = instance->run->mode == MODE_EVENT;
-    size_t pending = in_event_mode ? engine_pending(instance->engine) : model.n_jumps;
-    for (size_t i = 0; i < nValueReferences; i++) {
-        size_t clock = model.variables[valueReferences[i]].index;
-        bool pends = pending < model.n_jumps && model.clock_jump[clock] == pending;
-        values[i] = in_event_mode && (pends || engine_ticked(instance->engine, clock));
-    }
-    return fmi3OK;
-}
-
 /* ---- saved states ---- */
 
 fmi3Status fmi3GetFMUState(fmi3Instance handle, fmi3FMUState *FMUState)
@@ -628,129 +416,3 @@ fmi3Status fmi3DoStep(fmi3Instance handle, fmi3Float64 currentCommunicationPoint
     /* The call itself succeeded: it computed what there is, and says by its flags that it is the end. */
     return fmi3OK;
 }
-
-/* ---- what this FMU does not have ---- */
-
-/* Getters and setters of types that no variable has: nothing to do for no variables. */
-static fmi3Status no_such_type(fmi3Instance handle, const char *function, size_t n, bool set)
-{
-    Instance *instance = enter(handle, function, set ? MODE_SETTABLE : MODE_ANY);
-    if (!instance)
-        return fmi3Error;
-    if (n == 0)
-        return fmi3OK;
-    return refuse(instance, "%s: %s: no variable of this FMU has that type.", instance->name, function);
-}
-
-#define DEFINE_MISSING_TYPE(TYPE)                                                                                      \
-    fmi3Status fmi3Get##TYPE(fmi3Instance instance, const fmi3ValueReference valueReferences[],                        \
-                             size_t nValueReferences, fmi3##TYPE values[], size_t nValues)                             \
-    {                                                                                                                  \
-        (void)valueReferences, (void)values, (void)nValues;                                                            \
-        return no_such_type(instance, "fmi3Get" #TYPE, nValueReferences, false);                                       \
-    }                                                                                                                  \
-    fmi3Status fmi3Set##TYPE(fmi3Instance instance, const fmi3ValueReference valueReferences[],                        \
-                             size_t nValueReferences, const fmi3##TYPE values[], size_t nValues)                       \
-    {                                                                                                                  \
-        (void)valueReferences, (void)values, (void)nValues;                                                            \
-        return no_such_type(instance, "fmi3Set" #TYPE, nValueReferences, true);                                        \
-    }
-
-DEFINE_MISSING_TYPE(Float32)
-DEFINE_MISSING_TYPE(Int8)
-DEFINE_MISSING_TYPE(UInt8)
-DEFINE_MISSING_TYPE(Int16)
-DEFINE_MISSING_TYPE(UInt16)
-DEFINE_MISSING_TYPE(UInt32)
-DEFINE_MISSING_TYPE(Int64)
-DEFINE_MISSING_TYPE(UInt64)
-DEFINE_MISSING_TYPE(String)
-
-fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                         size_t valueSizes[], fmi3Binary values[], size_t nValues)
-{
-    (void)valueReferences, (void)valueSizes, (void)values, (void)nValues;
-    return no_such_type(instance, "fmi3GetBinary", nValueReferences, false);
-}
-
-fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                         const size_t valueSizes[], const fmi3Binary values[], size_t nValues)
-{
-    (void)valueReferences, (void)valueSizes, (void)values, (void)nValues;
-    return no_such_type(instance, "fmi3SetBinary", nValueReferences, true);
-}
-
-fmi3Status fmi3SetClock(fmi3Instance handle, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-                        const fmi3Clock values[])
-{
-    (void)valueReferences, (void)values;
-    Instance *instance = enter(handle, "fmi3SetClock", MODE_EVENT);
-    if (!instance)
-        return fmi3Error;
-    if (nValueReferences == 0)
-        return fmi3OK;
-    return refuse(instance, "%s: fmi3SetClock: this FMU has no input clocks.", instance->name);
-}
-
-/* One line for each function that does nothing but say so. */
-#define UNSUPPORTED(FUNCTION, ...)                                                                                     \
-    fmi3Status FUNCTION(fmi3Instance instance, __VA_ARGS__)                                                            \
-    {                                                                                                                  \
-        return unsupported(instance, #FUNCTION);                                                                       \
-    }
-#define UNSUPPORTED_PLAIN(FUNCTION)                                                                                    \
-    fmi3Status FUNCTION(fmi3Instance instance)                                                                         \
-    {                                                                                                                  \
-        return unsupported(instance, #FUNCTION);                                                                       \
-    }
-
-#if defined(__GNUC__)
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-#endif
-
-UNSUPPORTED(fmi3GetNumberOfVariableDependencies, fmi3ValueReference valueReference, size_t *nDependencies)
-UNSUPPORTED(fmi3GetVariableDependencies, fmi3ValueReference dependent, size_t elementIndicesOfDependent[],
-            fmi3ValueReference independents[], size_t elementIndicesOfIndependents[],
-            fmi3DependencyKind dependencyKinds[], size_t nDependencies)
-UNSUPPORTED(fmi3SerializedFMUStateSize, fmi3FMUState FMUState, size_t *size)
-UNSUPPORTED(fmi3SerializeFMUState, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
-UNSUPPORTED(fmi3DeserializeFMUState, const fmi3Byte serializedState[], size_t size, fmi3FMUState *FMUState)
-UNSUPPORTED(fmi3GetDirectionalDerivative, const fmi3ValueReference unknowns[], size_t nUnknowns,
-            const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-            fmi3Float64 sensitivity[], size_t nSensitivity)
-UNSUPPORTED(fmi3GetAdjointDerivative, const fmi3ValueReference unknowns[], size_t nUnknowns,
-            const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-            fmi3Float64 sensitivity[], size_t nSensitivity)
-UNSUPPORTED_PLAIN(fmi3EnterConfigurationMode)
-UNSUPPORTED_PLAIN(fmi3ExitConfigurationMode)
-UNSUPPORTED(fmi3GetIntervalDecimal, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            fmi3Float64 intervals[], fmi3IntervalQualifier qualifiers[])
-UNSUPPORTED(fmi3GetIntervalFraction, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            fmi3UInt64 counters[], fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[])
-UNSUPPORTED(fmi3GetShiftDecimal, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            fmi3Float64 shifts[])
-UNSUPPORTED(fmi3GetShiftFraction, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            fmi3UInt64 counters[], fmi3UInt64 resolutions[])
-UNSUPPORTED(fmi3SetIntervalDecimal, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            const fmi3Float64 intervals[])
-UNSUPPORTED(fmi3SetIntervalFraction, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-UNSUPPORTED(fmi3SetShiftDecimal, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            const fmi3Float64 shifts[])
-UNSUPPORTED(fmi3SetShiftFraction, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
-UNSUPPORTED_PLAIN(fmi3EvaluateDiscreteStates)
-UNSUPPORTED_PLAIN(fmi3EnterContinuousTimeMode)
-UNSUPPORTED(fmi3CompletedIntegratorStep, fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *enterEventMode,
-            fmi3Boolean *terminateSimulation)
-UNSUPPORTED(fmi3SetTime, fmi3Float64 time)
-UNSUPPORTED(fmi3SetContinuousStates, const fmi3Float64 continuousStates[], size_t nContinuousStates)
-UNSUPPORTED(fmi3GetContinuousStateDerivatives, fmi3Float64 derivatives[], size_t nContinuousStates)
-UNSUPPORTED(fmi3GetEventIndicators, fmi3Float64 eventIndicators[], size_t nEventIndicators)
-UNSUPPORTED(fmi3GetContinuousStates, fmi3Float64 continuousStates[], size_t nContinuousStates)
-UNSUPPORTED(fmi3GetNominalsOfContinuousStates, fmi3Float64 nominals[], size_t nContinuousStates)
-UNSUPPORTED(fmi3GetNumberOfEventIndicators, size_t *nEventIndicators)
-UNSUPPORTED(fmi3GetNumberOfContinuousStates, size_t *nContinuousStates)
-UNSUPPORTED(fmi3GetOutputDerivatives, const fmi3ValueReference valueReferences[], size_t nValueReferences,
-            const fmi3Int32 orders[], fmi3Float64 values[], size_t nValues)
-UNSUPPORTED(fmi3ActivateModelPartition, fmi3ValueReference clockReference, fmi3Float64 activationTime)

@@ -45,6 +45,7 @@ bool apply_reset(Engine *engine, size_t jump, const Point *point)
         return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.", entry->name,
                        *point->time);
     snprintf(source, sizeof source, "the jump map of '%s'", entry->name);
+    end_text_cleanly(source);
     return accept_state(engine, source, point);
 }
 
