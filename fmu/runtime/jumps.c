@@ -153,12 +153,11 @@ static bool count_jump(Engine *engine, size_t jump)
     double t = *engine->live.time;
     if (status->jumps_time != t) {
         status->jumps_time = t;
-        status->state_jumps_there = status->time_jumps_there = 0;
+        status->time_jumps_there = 0;
     }
     status->jumps_taken++;
     if (engine->model->jumps[jump].kind == JUMP_ON_TIME)
         return ++status->time_jumps_there <= TIME_EVENT_REPEATS || stuck_in_time(engine, jump, t);
-    status->state_jumps_there++;
     return zeno_record(engine, jump);
 }
 

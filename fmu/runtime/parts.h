@@ -51,15 +51,15 @@ typedef struct {
     uint64_t total;
     uint64_t stored;
     uint64_t burst;
+    uint64_t at_once;
 } JumpHistory;
 
 /* The scalars that evolve. */
 typedef struct {
     double relative_tolerance, absolute_tolerance;
-    double jumps_time;            /* the time that the next three count at */
-    uint64_t state_jumps_there;
+    double jumps_time;            /* the time at which time_jumps_there counts */
     uint64_t time_jumps_there;
-    uint64_t jumps_taken;
+    uint64_t jumps_taken;         /* in the last advance */
     int32_t prediction;
     int32_t ending;
     char message[MESSAGE_SIZE];

@@ -1,4 +1,5 @@
-/* The Zeno guard: what is counted for each jump on the state, and when a run stops.
+/* The Zeno guard: what is counted for each jump on the state, and when a run stops.  Each jump is
+   counted by itself: many parts of a model that jump together are not yet an accumulation.
 
    (a) more jumps at one instant than any cascade needs; (b) gaps that shrink like a geometric
    sequence whose rest is below the tolerance: the jumps accumulate; (c) a burst of jumps in
@@ -18,8 +19,10 @@
 static void remember(JumpHistory *history, double t)
 {
     history->total++;
+    history->at_once++;
     if (history->stored > 0 && history->times[N_ZENO_TIMES - 1] == t)
         return;
+    history->at_once = 1;
     for (size_t i = 0; i + 1 < N_ZENO_TIMES; i++)
         history->times[i] = history->times[i + 1];
     history->times[N_ZENO_TIMES - 1] = t;
@@ -53,16 +56,14 @@ bool zeno_record(Engine *engine, size_t jump)
     JumpHistory *history = &engine->history[jump];
     const char *name = engine->model->jumps[jump].name;
     double t = *engine->live.time, gap = 0.0, ratio = 0.0;
-    unsigned long long total, there = engine->status->state_jumps_there, burst;
     remember(history, t);
-    total = history->total;
-    burst = history->burst;
-    if (there > JUMPS_AT_ONE_TIME)
+    unsigned long long total = history->total, at_once = history->at_once, burst = history->burst;
+    if (at_once > JUMPS_AT_ONE_TIME)
         return problem(engine, ENDED_ZENO,
-                       "Zeno: %llu jumps at one instant, t = %.10g s, the last one '%s'. "
+                       "Zeno: %llu jumps of '%s' at one instant, t = %.10g s. "
                        "Remedy: let the jump leave its jump set, or give the jump set a minimum dwell time; a trigger "
                        "whose two sides are both zero fires for ever unless its inequality is strict.",
-                       there, t, name);
+                       at_once, name, t);
     if (shrinking(history, &gap, &ratio)) {
         double rest = gap * ratio / (1.0 - ratio);
         if (rest < REST_TOLERANCE * fmax(1.0, fabs(t)))
