@@ -98,12 +98,9 @@ class Symbols(np.ndarray[Any, np.dtype[Any]]):
         return symbols(getattr(elementwise, method)(given[0], **options))
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        """Let numpy rearrange arrays; choose element by element in `numpy.where`."""
-        if function is np.where:
-            if len(args) != 3:
-                raise TraceError("np.where with a condition only asks for indices: give np.where(condition, a, b).")
-            choose = np.frompyfunc(lambda condition, a, b: ca.if_else(condition, a, b), 3, 1)
-            return symbols(choose(*(_plain(value) for value in args)))
+        """Let numpy rearrange arrays; what compares or computes is written with element-wise functions instead."""
+        if function in _REWRITTEN:
+            return _REWRITTEN[function](*args, **kwargs)
         result = super().__array_function__(function, types, args, kwargs)
         return symbols(result) if isinstance(result, np.ndarray) and result.dtype == object else result
 
@@ -128,6 +125,26 @@ class Symbols(np.ndarray[Any, np.dtype[Any]]):
 
     def __int__(self) -> int:
         raise TraceError("a traced value is converted to an integer: use np.floor instead of int.")
+
+
+def _where(*args: Any) -> Symbols:
+    if len(args) != 3:
+        raise TraceError("np.where with a condition only asks for indices: give np.where(condition, a, b).")
+    choose = np.frompyfunc(lambda condition, a, b: ca.if_else(condition, a, b), 3, 1)
+    return symbols(choose(*(_plain(value) for value in args)))
+
+
+def _clip(value: Any, low: Any, high: Any) -> Any:
+    return np.minimum(np.maximum(value, low), high)
+
+
+def _norm(vector: Any) -> Any:
+    if np.ndim(vector) != 1:
+        raise TraceError("np.linalg.norm can be traced for vectors only: write a matrix norm with arithmetic.")
+    return np.sqrt(np.sum(vector * vector))
+
+
+_REWRITTEN: dict[Callable[..., Any], Callable[..., Any]] = {np.where: _where, np.clip: _clip, np.linalg.norm: _norm}
 
 
 def symbols(value: Any) -> Symbols:

@@ -1,0 +1,115 @@
+"""An exported FMU is right in each way that importers use it: fmpy as it is, with and without event mode."""
+
+import itertools
+
+import fmpy
+import numpy as np
+import pytest
+from catalogue import cases
+
+import hybrid_model as hm
+from hybrid_model.models import BouncingBall
+
+USES = {
+    "event mode off": {},
+    "event mode, early return": {"use_event_mode": True, "early_return_allowed": True},
+    "event mode without early return": {"use_event_mode": True},
+}
+
+
+def error_on_either_side(arc, name, times, values):
+    """Distance from the run; at the time of an event fmpy writes a row for each side, and times differ by rounding."""
+    sides = [arc.at(name, np.clip(times + shift, arc.t[0], arc.t[-1])) for shift in (-1e-10, 1e-10)]
+    return np.minimum(*(np.abs(np.asarray(values) - side) for side in sides))
+
+
+@pytest.mark.parametrize("use", USES)
+def test_bouncing_ball_in_fmpy_equals_python_run(use, exported):
+    """Jumps happen inside at exact times, or the FMU stops itself at them; either way the outputs are exact."""
+    arc = hm.simulate(BouncingBall(), 2.0)
+    result = fmpy.simulate_fmu(
+        str(exported(BouncingBall(), "ball")), stop_time=2.0, output_interval=0.1, output=["h", "v"], **USES[use]
+    )
+    for name in ("h", "v"):
+        # Falling for 1e-10 s changes h by less than 1e-9 and v by 1e-9.
+        assert error_on_either_side(arc, name, result["time"], result[name]).max() < 1e-8
+
+
+def test_events_are_rows_of_their_own_in_event_mode(exported):
+    result = fmpy.simulate_fmu(
+        str(exported(BouncingBall(), "ball")), stop_time=1.0, output_interval=0.25, **USES["event mode, early return"]
+    )
+    impact = np.sqrt(2 / 9.81)
+    rows = [row for row in result if abs(row["time"] - impact) < 1e-9]
+    assert len(rows) == 2
+    assert rows[0]["v"] == pytest.approx(-9.81 * impact, abs=1e-9)
+    assert rows[1]["v"] == pytest.approx(0.7 * 9.81 * impact, abs=1e-9)
+
+
+@pytest.mark.parametrize("use", USES)
+def test_agent_with_changing_inputs_in_fmpy(use, exported):
+    """The neighbours' broadcasts come as discrete inputs at communication points."""
+    case = cases()["agent2_dynamic"]
+    changes = {name: dict(steps) for name, steps in case.steps.items()}
+    times = sorted({0.0, case.t_end, *itertools.chain(*changes.values())})
+    start = {"neighbours[1]": 0.0, "neighbours[2]": 0.0}
+    rows = []
+    for t in times:
+        start.update({name: steps[t] for name, steps in changes.items() if t in steps})
+        rows.append((t, *start.values()))
+    signals = np.array(rows, dtype=[("time", float), *((name, float) for name in start)])
+    inputs = {
+        "neighbours": hm.Signal(
+            lambda t: [signals[name][np.searchsorted(times, t, side="right") - 1] for name in start], times[1:-1]
+        )
+    }
+    arc = hm.simulate(case.automaton, case.t_end, inputs=inputs)
+    result = fmpy.simulate_fmu(
+        str(exported(case.automaton, "agent2_dynamic")),
+        stop_time=case.t_end,
+        output_interval=0.5,
+        input=signals,
+        output=["x", "broadcast", "events"],
+        **USES[use],
+    )
+    events = arc.event_times("trigger.broadcast")
+    assert len(events) == result["events"][-1] > 3
+    assert error_on_either_side(arc, "x", result["time"], result["x"]).max() < 1e-8
+
+
+@pytest.mark.parametrize("name", list(cases()))
+def test_every_declared_variable_is_readable_right_after_initialisation(name, exported):
+    path = str(exported(cases()[name].automaton, name))
+    description = fmpy.read_model_description(path)
+    folder = fmpy.extract(path)
+    for events in (False, True):
+        fmu = fmpy.fmi3.FMU3Slave(
+            guid=description.instantiationToken,
+            unzipDirectory=folder,
+            modelIdentifier=description.coSimulation.modelIdentifier,
+            instanceName="block",
+        )
+        fmu.instantiate(eventModeUsed=events, earlyReturnAllowed=events)
+        fmu.enterInitializationMode(startTime=0.0)
+        fmu.exitInitializationMode()
+        for variable in description.modelVariables:
+            values = getattr(fmu, f"get{variable.type}")([variable.valueReference])
+            assert np.all(np.isfinite(values))
+            if variable.start is not None and variable.type != "Clock":
+                assert float(values[0]) == float(variable.start)
+        fmu.terminate()
+        fmu.freeInstance()
+
+
+def test_start_values_and_parameters_can_be_set(exported):
+    path = str(exported(BouncingBall(), "ball"))
+    result = fmpy.simulate_fmu(path, stop_time=0.4, start_values={"h": 2.0, "g": 5.0}, output_interval=0.4)
+    assert result["h"][-1] == pytest.approx(2.0 - 0.5 * 5.0 * 0.4**2, abs=1e-12)
+
+
+def test_computed_start_values_follow_what_is_set(exported):
+    """The first broadcast is the agent's start state, whatever that is set to."""
+    case = cases()["agent2_static"]
+    path = str(exported(case.automaton, "agent2_static"))
+    result = fmpy.simulate_fmu(path, stop_time=0.0001, start_values={"x": 7.0}, output=["x", "broadcast"])
+    assert result["broadcast"][0] == 7.0

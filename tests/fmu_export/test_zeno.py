@@ -1,0 +1,74 @@
+"""A Zeno model in an FMU ends as a clean refusal at the accumulation time, never as a hang or below the floor.
+
+Each run is a child process under a time limit: if the guard failed, the test would too, and not the whole suite.
+"""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from hybrid_model.models import BouncingBall
+
+ACCUMULATION = np.sqrt(2 / 9.81) * 1.7 / 0.3
+
+SIMULATE = """
+import sys, fmpy
+messages = []
+log = lambda environment, status, category, message: messages.append(message.decode())
+try:
+    result = fmpy.simulate_fmu(sys.argv[1], stop_time=5.0, output_interval=0.01, logger=log,
+                               use_event_mode=sys.argv[2] == "1", early_return_allowed=sys.argv[3] == "1")
+    print(result["time"][-1], min(result["h"]))
+except Exception as error:
+    print("refused", error)
+print(messages[-1] if messages else "silent")
+"""
+
+
+@pytest.mark.parametrize(("events", "early"), [("0", "0"), ("1", "0"), ("1", "1")])
+def test_fmpy_run_beyond_the_accumulation_ends(events, early, exported):
+    command = [sys.executable, "-c", SIMULATE, str(exported(BouncingBall(), "ball")), events, early]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    end, message = done.stdout.strip().splitlines()[-2:]
+    assert "accumulate at t = 2.5586" in message
+    if not end.startswith("refused"):
+        time, lowest = map(float, end.split())
+        assert time <= ACCUMULATION + 0.01
+        assert lowest >= -1e-9
+
+
+LOW_LEVEL = """
+import sys, fmpy
+from fmpy.fmi3 import FMU3Slave
+description = fmpy.read_model_description(sys.argv[1])
+messages = []
+log = lambda environment, status, category, message: messages.append(message.decode())
+fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=fmpy.extract(sys.argv[1]),
+                modelIdentifier=description.coSimulation.modelIdentifier, instanceName="ball")
+fmu.instantiate(logMessage=log)
+fmu.enterInitializationMode(startTime=0.0)
+fmu.exitInitializationMode()
+event, terminate, early, reached = fmu.doStep(0.0, 5.0)
+print(terminate, reached)
+print(fmu.getFloat64([v.valueReference for v in description.modelVariables if v.name == "h"])[0])
+print(messages[-1])
+try:
+    fmu.doStep(reached, 1.0)
+    print("went on")
+except Exception as error:
+    print("refused")
+"""
+
+
+def test_one_long_step_ends_at_the_accumulation_and_further_steps_are_refused(exported):
+    command = [sys.executable, "-c", LOW_LEVEL, str(exported(BouncingBall(), "ball"))]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    first, height, message, last = done.stdout.strip().splitlines()[-4:]
+    terminate, reached = first.split()
+    assert terminate == "True"
+    assert float(reached) == pytest.approx(ACCUMULATION, abs=1e-3)
+    assert float(height) >= -1e-9
+    assert "accumulate at t = 2.5586" in message
+    assert last == "refused"
