@@ -342,9 +342,10 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance handle, fmi3Boolean *discreteSt
     *valuesOfContinuousStatesChanged = changed;
     /* This iteration's clocks are over; the next one's are those of the jump that comes next. */
     engine_clear_ticks(engine);
-    *nextEventTime = 0.0;
     *nextEventTimeDefined =
         !*terminateSimulation && !*discreteStatesNeedUpdate && next_event(instance, nextEventTime);
+    if (!*nextEventTimeDefined)
+        *nextEventTime = 0.0;
     if (*terminateSimulation)
         refuse(instance, "%s: %s", instance->name, engine_message(engine));
     return fmi3OK;
