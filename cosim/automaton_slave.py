@@ -8,8 +8,8 @@ import numpy as np
 
 from cosim.errors import CosimError
 from cosim.lookahead import Lookahead, take_internal
-from cosim.slave import Port, Slave, Step, Update
-from hybrid_model import Automaton, Execution, Solver
+from cosim.slave import Port, Slave, Step, Termination, Update
+from hybrid_model import Automaton, Execution, Solver, Stop
 from hybrid_model.layout import Layout
 from hybrid_model.signals import Inputs
 from hybrid_model.variables import Kind, element_names
@@ -110,7 +110,7 @@ class AutomatonSlave(Slave):
             ticks = tuple(clock.name for clock in self.automaton.clocks if clock.jump == index)
             take_internal(run)
         if run.stopped is not None:
-            return Update(False, ticks, terminated=run.message)
+            return Update(False, ticks, terminated=_termination(run))
         again = run.due() is not None
         return Update(again, ticks, None if again else self._predict())
 
@@ -130,7 +130,7 @@ class AutomatonSlave(Slave):
             if t_next <= run.t + run.solver.event_tolerance:
                 run.drift(t_next)
         due = self._events and ((ahead is not None and run is ahead.end) or run.due() is not None)
-        return Step(run.t, due, run.message if run.stopped is not None else "")
+        return Step(run.t, due, _termination(run))
 
     def _search(self, run: Execution, t_next: float) -> None:
         """Flow to `t_next`, looking for events on the way."""
@@ -184,6 +184,10 @@ class AutomatonSlave(Slave):
         if self._ahead is None:
             self._ahead = Lookahead.from_run(self._running, self._t_stop)
         return self._ahead.end.t
+
+
+def _termination(run: Execution) -> Termination | None:
+    return None if run.stopped is None else Termination(run.message, run.stopped is Stop.ZENO)
 
 
 def _is_output(automaton: Automaton, element: str) -> bool:

@@ -12,7 +12,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 
 from cosim.errors import CosimError
-from cosim.slave import Port, Slave, Step, Update
+from cosim.slave import Port, Slave, Step, Termination, Update
 
 
 class FmuSlave(Slave):
@@ -121,12 +121,12 @@ class FmuSlave(Slave):
         """See `Slave.update`."""
         ticks = self._ticks()
         again, terminate, _, _, defined, time = self._call(self._instance.updateDiscreteStates)
-        return Update(again, ticks, time if defined else None, self._said() if terminate else "")
+        return Update(again, ticks, time if defined else None, self._termination(terminate))
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Slave.step`."""
         event, terminate, _, reached = self._call(self._instance.doStep, t, t_next - t)
-        return Step(reached, event, self._said() if terminate else "")
+        return Step(reached, event, self._termination(terminate))
 
     def save(self) -> Any:
         """See `Slave.save`."""
@@ -175,6 +175,10 @@ class FmuSlave(Slave):
 
     def _log(self, environment: Any, status: int, category: bytes | None, message: bytes) -> None:
         self._messages.append(message.decode("utf-8", "replace"))
+
+    def _termination(self, terminate: bool) -> Termination | None:
+        # FMI has no reason for terminateSimulation; the FMUs that this project exports name it in their message.
+        return Termination(self._said(), "Zeno" in self._said()) if terminate else None
 
     def _said(self) -> str:
         return self._messages[-1] if self._messages else "the FMU logged no message"

@@ -8,11 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from cosim.slave import Termination
+
 
 class Ended(enum.Enum):
     """Why a co-simulation ended; the value is the remedy."""
 
     HORIZON = "The stop time was reached."
+    ZENO = "The jumps of a slave accumulate: end the run before that time, or change the slave as its message says."
     TERMINATED = "A slave ended the run: its message says why and what to change."
 
 
@@ -53,6 +56,11 @@ class CosimResult:
     signals: dict[str, list[float]] = field(default_factory=dict)
     final: dict[str, float] = field(default_factory=dict)
     steps: int = 0
+
+    def terminate(self, slave: str, t: float, why: Termination) -> None:
+        """Note that a slave ended the run at `t` in s."""
+        self.ended = Ended.ZENO if why.zeno else Ended.TERMINATED
+        self.message, self.t = f"{slave}: {why.message}", t
 
     def tick_times(self, slave: str, clock: str) -> npt.NDArray[np.float64]:
         """Return the times in s at which a clock ticked."""

@@ -28,6 +28,22 @@ class Port:
 
 
 @dataclass(frozen=True)
+class Termination:
+    """Why a block ended the run.
+
+    Attributes
+    ----------
+    message : str
+        In the block's words.
+    zeno : bool
+        Whether a Zeno guard did, as far as the block says.
+    """
+
+    message: str
+    zeno: bool
+
+
+@dataclass(frozen=True)
 class Update:
     """What one event iteration of a block gave.
 
@@ -39,14 +55,14 @@ class Update:
         Output clocks that ticked.
     next_event : float or None
         Absolute time in s of the block's next event as long as its inputs stay; None if it does not know.
-    terminated : str
-        Why the block ended the run; empty if it did not.
+    terminated : Termination or None
+        Why the block ended the run, if it did.
     """
 
     again: bool
     ticks: tuple[str, ...] = ()
     next_event: float | None = None
-    terminated: str = ""
+    terminated: Termination | None = None
 
 
 @dataclass(frozen=True)
@@ -59,13 +75,13 @@ class Step:
         Time in s that the block is at now.
     event : bool
         Whether it has an event to be handled there.
-    terminated : str
-        Why the block ended the run; empty if it did not.
+    terminated : Termination or None
+        Why the block ended the run, if it did.
     """
 
     reached: float
     event: bool
-    terminated: str = ""
+    terminated: Termination | None = None
 
 
 class Slave(ABC):

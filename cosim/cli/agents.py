@@ -9,9 +9,8 @@ import numpy as np
 
 from cosim.automaton_slave import AutomatonSlave
 from cosim.fmu_slave import FmuSlave
-from cosim.result import CosimResult, Ended
+from cosim.result import CosimResult
 from cosim.system import System
-from hybrid_model import Stop
 from hybrid_model.consensus.network import agent_name, broadcast_wires, scenario_agents
 from hybrid_model.consensus.report import RunReport, edge_norm
 from hybrid_model.consensus.scenario_data import Scenario
@@ -41,7 +40,7 @@ def network_report(scenario: Scenario, result: CosimResult) -> RunReport:
         x_end=x_end,
         edge_norm_end=edge_norm(scenario, x_end),
         mean_drift=float(np.max(np.abs(mean - np.mean(scenario.network.initial)))),
-        stop=(Stop.HORIZON if result.ended is Ended.HORIZON else Stop.BLOCKED).name,
+        stop=result.ended.name,
         message=result.message or f"{scenario.name}: reached t = {result.t:.9g} s.",
     )
 

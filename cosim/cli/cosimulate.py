@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.agents import fmu_system
-from cosim.cli.exits import Exit, UsageError, progress, start_values, write_csv
+from cosim.cli.exits import UsageError, exit_of, progress, start_values, write_csv
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
-from cosim.result import CosimResult, Ended
+from cosim.result import CosimResult
 from cosim.system import System
 from fmu.export import export_fmu
 from hybrid_model.consensus.network import scenario_agents
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     if options.output_file:
         write_csv(options.output_file, result.times, result.signals)
     print(_text(result))
-    return Exit.DONE if result.ended is Ended.HORIZON else Exit.FAILED
+    return exit_of(result.ended.name)
 
 
 def _agents(scenario: Scenario, folder: Path) -> System:

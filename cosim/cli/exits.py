@@ -8,8 +8,6 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from hybrid_model import Stop
-
 
 class UsageError(ValueError):
     """A command was given something that it does not know."""
@@ -24,9 +22,9 @@ class Exit(enum.IntEnum):
     ZENO = 3
 
 
-def exit_of(stop: Stop) -> Exit:
-    """Return the exit status for the way a run ended."""
-    return {Stop.HORIZON: Exit.DONE, Stop.ZENO: Exit.ZENO, Stop.BLOCKED: Exit.FAILED}[stop]
+def exit_of(stop: str) -> Exit:
+    """Return the exit status for the name of the way a run ended (`hybrid_model.Stop`, `cosim.result.Ended`)."""
+    return {"HORIZON": Exit.DONE, "ZENO": Exit.ZENO}.get(stop, Exit.FAILED)
 
 
 def progress(text: str) -> None:

@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
     summary.write_text(json.dumps(_summary(comparisons), indent=2) + "\n", encoding="utf-8")
     print(_table(comparisons))
     print(f"\nFigures, FMUs and summary.json are in {options.out}.")
-    return max(exit_of(comparison.arc.stop) for comparison in comparisons.values())
+    return max(exit_of(comparison.report.stop) for comparison in comparisons.values())
 
 
 def _compare(kind: str, scenario: Scenario, out: Path) -> Comparison:

@@ -53,7 +53,7 @@ def run(options: argparse.Namespace) -> int:
         (options.out / "run.json").write_text(document + "\n", encoding="utf-8")
         write_csv(options.out / "trajectory.csv", times, signals)
     print(document if options.json else _text(scenario, report))
-    return exit_of(hm.Stop[report.stop])
+    return exit_of(report.stop)
 
 
 def _as_one(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[str, Any]]:

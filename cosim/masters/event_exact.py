@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.start import outputs, require_times, sample, start_slaves
 from cosim.result import CosimResult, Ended, Tick
-from cosim.slave import Slave, Step
+from cosim.slave import Slave, Step, Termination
 from cosim.system import System
 
 SIMULTANEOUS = 1e-9
@@ -257,5 +257,5 @@ class _Run:
                 block.slave.release(state)
         return [block for block in stopped if block.t <= first + SIMULTANEOUS]
 
-    def _terminate(self, name: str, t: float, why: str) -> None:
-        self.result.ended, self.result.message, self.result.t = Ended.TERMINATED, f"{name}: {why}", t
+    def _terminate(self, name: str, t: float, why: Termination) -> None:
+        self.result.terminate(name, t, why)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from cosim.masters.start import outputs, require_times, sample, start_slaves
-from cosim.result import CosimResult, Ended
+from cosim.result import CosimResult
 from cosim.system import System
 
 
@@ -62,7 +62,7 @@ def _step_all(system: System, result: CosimResult, t_next: float) -> bool:
         made = slave.step(result.t, t_next)
         result.steps += 1
         if made.terminated:
-            result.ended, result.message, result.t = Ended.TERMINATED, f"{name}: {made.terminated}", made.reached
+            result.terminate(name, made.reached, made.terminated)
             return False
     result.t = t_next
     # Read everything before writing anything: the order of slaves must not matter.

@@ -1,13 +1,15 @@
-"""The paper's figures: states, and the norm of the edge states with its bounds, for a run of a scenario."""
+"""Figures of a scenario's run: states, edge norm with its bounds, error against threshold, broadcasts."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 
 from hybrid_model.arc import HybridArc
@@ -15,12 +17,14 @@ from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound
 from hybrid_model.consensus.network import agent_name
 from hybrid_model.consensus.report import edge_norm
 from hybrid_model.consensus.scenario_data import Scenario
-from hybrid_model.plots import JOURNAL, curve, new_axes
+from hybrid_model.plots import JOURNAL, curve, new_axes, plot_raster
 
 COLUMN = (3.4, 2.5)
 """Width and height in inches of a figure in one column of a journal."""
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#999999")
 """Colours that remain apart for colour-blind readers."""
+MARKER: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.2}
+"""A broadcast in a figure over time."""
 
 
 def plot_states(scenario: Scenario, arc: HybridArc, ax: Axes | None = None) -> Axes:
@@ -36,18 +40,18 @@ def plot_states(scenario: Scenario, arc: HybridArc, ax: Axes | None = None) -> A
         Where to draw.
     """
     ax = new_axes(ax)
-    for i in range(1, scenario.network.agents + 1):
-        name = agent_name(i)
-        color = COLORS[(i - 1) % len(COLORS)]
-        ax.plot(*curve(arc, f"{name}.x"), color=color, label=f"$x_{{{i}}}$")
+    n = scenario.network.agents
+    for i in range(1, n + 1):
+        name, color = agent_name(i), _color(i)
+        # With more agents than colours a legend could not tell them apart.
+        ax.plot(*curve(arc, f"{name}.x"), color=color, label=f"$x_{{{i}}}$" if n <= len(COLORS) else None)
         times = arc.event_times(f"{name}.trigger.broadcast")
-        ax.plot(times, arc.at(f"{name}.x", times), linestyle="none", marker="o", markersize=2.2, color=color)
-    ax.axhline(float(np.mean(scenario.network.initial)), color="0.6", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0)
-    ax.set_xlabel("time $t$ (s)")
+        ax.plot(times, arc.at(f"{name}.x", times), color=color, clip_on=False, **MARKER)
+    mean = float(np.mean(scenario.network.initial))
+    ax.axhline(mean, color="0.5", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0, label="mean")
+    ax.plot([], [], color="0.3", label="broadcast", **MARKER)
     ax.set_ylabel("states $x_i$")
-    ax.set_xlim(0.0, scenario.stop_time)
-    ax.legend(ncols=min(4, scenario.network.agents), loc="upper right")
-    return ax
+    return _over_time(ax, scenario)
 
 
 def plot_edge_norm(
@@ -62,7 +66,7 @@ def plot_edge_norm(
     arc : HybridArc
         Its run.
     bounds : sequence of ConvergenceBound
-        Those that say nothing about the scenario are left out.
+        The legend says which of them do not hold for the scenario; their notes say why.
     ax : Axes, optional
         Where to draw.
     """
@@ -72,14 +76,109 @@ def plot_edge_norm(
     ax.semilogy(times, edge_norm(scenario, np.array([first, *others])), color="k", label=r"$\|x_e(t)\|$")
     styles = {BoundForm.PRINTED: ("#d55e00", (0, (5, 2))), BoundForm.VALID: ("#0072b2", "solid")}
     grid = np.linspace(0.0, scenario.stop_time, 300)
-    for bound in bounds:
-        if bound.kappa2 is not None:
-            color, style = styles[bound.form]
-            ax.semilogy(grid, bound.at(grid), color=color, linestyle=style, label=f"bound, {bound.form.value}")
+    # Those that hold come first, so that the words for the others end the legend.
+    for bound in sorted(bounds, key=lambda bound: bound.kappa2 is None):
+        color, style = styles[bound.form]
+        if bound.kappa2 is None:
+            ax.plot([], [], linestyle="none", label=f"no {bound.form.value} bound")
+        else:
+            ax.semilogy(grid, bound.at(grid), color=color, linestyle=style, label=f"{bound.form.value} bound")
+    ax.set_ylabel(r"norm of edge states $\|x_e\|$")
+    return _over_time(ax, scenario)
+
+
+def plot_error_against_threshold(scenario: Scenario, arc: HybridArc, agent: int, ax: Axes | None = None) -> Axes:
+    """Draw one agent's error ``|xhat - x|`` and the threshold it may not pass, with a dot at each broadcast.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran.
+    arc : HybridArc
+        Its run.
+    agent : int
+        Number of the agent, counted from 1.
+    ax : Axes, optional
+        Where to draw.
+
+    Raises
+    ------
+    ValueError
+        If there is no such agent.
+    """
+    if not 1 <= agent <= scenario.network.agents:
+        raise ValueError(
+            f"there is no agent {agent} in {scenario.name}: its agents are 1 to {scenario.network.agents}."
+        )
+    ax = new_axes(ax)
+    name, color = agent_name(agent), _color(agent)
+    times, x = curve(arc, f"{name}.x")
+    _, broadcast = curve(arc, f"{name}.broadcast")
+    error = rf"$|\hat{{x}}_{{{agent}}} - x_{{{agent}}}|$"
+    ax.plot(times, np.abs(broadcast - x), color=color, label=error)
+    grid = np.linspace(0.0, scenario.stop_time, 300)
+    label = r"threshold $c\,e^{-\beta t}$" if scenario.trigger.decay > 0 else "threshold $c$"
+    ax.plot(grid, scenario.trigger.level(grid), color="k", linestyle=(0, (5, 2)), label=label)
+    events = arc.event_times(f"{name}.trigger.broadcast")
+    reached = np.abs(arc.at(f"{name}.broadcast", events, before=True) - arc.at(f"{name}.x", events))
+    ax.plot(events, reached, color=color, label="broadcast", clip_on=False, **MARKER)
+    ax.set_ylim(bottom=0.0)
+    ax.set_ylabel(f"error of agent {agent}")
+    return _over_time(ax, scenario)
+
+
+def plot_broadcasts(scenario: Scenario, event_times: Sequence[npt.ArrayLike], ax: Axes | None = None) -> Axes:
+    """Draw who broadcasts when: one row an agent, with the number of its broadcasts at the right.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran.
+    event_times : sequence of array_like
+        Times in s of each agent's broadcasts, as in `RunReport.event_times`; of a co-simulation as well.
+    ax : Axes, optional
+        Where to draw.
+
+    Raises
+    ------
+    ValueError
+        If there is not one row of times for each agent.
+    """
+    if len(event_times) != scenario.network.agents:
+        raise ValueError(
+            f"{len(event_times)} rows of broadcast times for the {scenario.network.agents} agents of {scenario.name}: "
+            "give one row an agent."
+        )
+    rows = {f"agent {i}": np.asarray(times, dtype=float) for i, times in enumerate(event_times, start=1)}
+    ax = plot_raster(rows, ax)
+    for i, (collection, times) in enumerate(zip(ax.collections, rows.values(), strict=True), start=1):
+        collection.set_color(_color(i))
+        ax.text(1.02, i - 1, f"{len(times)}", transform=ax.get_yaxis_transform(), va="center", fontsize="small")
+    ax.text(1.06, 1.0, "broadcasts", transform=ax.transAxes, ha="right", va="bottom", fontsize="small")
+    ax.set_ylim(len(rows) - 0.4, -0.6)
+    ax.tick_params(axis="y", length=0)
+    return _over_time(ax, scenario)
+
+
+def _color(agent: int) -> str:
+    return COLORS[(agent - 1) % len(COLORS)]
+
+
+def _over_time(ax: Axes, scenario: Scenario) -> Axes:
+    """Finish axes over the run: room between the axis and the fast start, and a legend that hides no curve."""
     ax.set_xlabel("time $t$ (s)")
-    ax.set_ylabel(r"norm of the edge states")
     ax.set_xlim(0.0, scenario.stop_time)
-    ax.legend(loc="center right")
+    ax.spines["left"].set_position(("outward", 4.0))
+    handles, labels = ax.get_legend_handles_labels()
+    if handles:
+        ax.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            borderaxespad=0.3,
+            ncols=len(labels) if len(labels) < 4 else (len(labels) + 1) // 2,
+            columnspacing=1.2,
+            handlelength=1.4,
+        )
     return ax
 
 

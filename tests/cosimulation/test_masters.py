@@ -124,7 +124,7 @@ def test_a_slave_that_cannot_predict_is_stopped_at_its_event_and_others_are_not_
 
 def test_zeno_ends_the_run_with_the_time_of_the_accumulation():
     result = run_event_exact(System(slaves(("ball", BouncingBall())), {}), 5.0)
-    assert result.ended is Ended.TERMINATED
+    assert result.ended is Ended.ZENO
     assert "accumulate at t = 2.5586" in result.message
     assert result.t == pytest.approx(np.sqrt(2 / 9.81) * 1.7 / 0.3, abs=1e-3)
 
