@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 
 from hybrid_model.arc import HybridArc
 from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound
@@ -46,12 +47,12 @@ def plot_states(scenario: Scenario, arc: HybridArc, ax: Axes | None = None) -> A
         # With more agents than colours a legend could not tell them apart.
         ax.plot(*curve(arc, f"{name}.x"), color=color, label=f"$x_{{{i}}}$" if n <= len(COLORS) else None)
         times = arc.event_times(f"{name}.trigger.broadcast")
-        ax.plot(times, arc.at(f"{name}.x", times), color=color, clip_on=False, **MARKER)
+        if times.size:  # an empty line counts as a point in the corner when figures are cropped
+            ax.plot(times, arc.at(f"{name}.x", times), color=color, clip_on=False, **MARKER)
     mean = float(np.mean(scenario.network.initial))
     ax.axhline(mean, color="0.5", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0, label="mean")
-    ax.plot([], [], color="0.3", label="broadcast", **MARKER)
     ax.set_ylabel("states $x_i$")
-    return _over_time(ax, scenario)
+    return _over_time(ax, scenario, [Line2D([], [], color="0.3", label="broadcast", **MARKER)])
 
 
 def plot_edge_norm(
@@ -76,15 +77,15 @@ def plot_edge_norm(
     ax.semilogy(times, edge_norm(scenario, np.array([first, *others])), color="k", label=r"$\|x_e(t)\|$")
     styles = {BoundForm.PRINTED: ("#d55e00", (0, (5, 2))), BoundForm.VALID: ("#0072b2", "solid")}
     grid = np.linspace(0.0, scenario.stop_time, 300)
-    # Those that hold come first, so that the words for the others end the legend.
-    for bound in sorted(bounds, key=lambda bound: bound.kappa2 is None):
+    missing = []
+    for bound in bounds:
         color, style = styles[bound.form]
         if bound.kappa2 is None:
-            ax.plot([], [], linestyle="none", label=f"no {bound.form.value} bound")
+            missing.append(Line2D([], [], linestyle="none", label=f"no {bound.form.value} bound"))
         else:
             ax.semilogy(grid, bound.at(grid), color=color, linestyle=style, label=f"{bound.form.value} bound")
     ax.set_ylabel(r"norm of edge states $\|x_e\|$")
-    return _over_time(ax, scenario)
+    return _over_time(ax, scenario, missing)
 
 
 def plot_error_against_threshold(scenario: Scenario, arc: HybridArc, agent: int, ax: Axes | None = None) -> Axes:
@@ -120,8 +121,9 @@ def plot_error_against_threshold(scenario: Scenario, arc: HybridArc, agent: int,
     label = r"threshold $c\,e^{-\beta t}$" if scenario.trigger.decay > 0 else "threshold $c$"
     ax.plot(grid, scenario.trigger.level(grid), color="k", linestyle=(0, (5, 2)), label=label)
     events = arc.event_times(f"{name}.trigger.broadcast")
-    reached = np.abs(arc.at(f"{name}.broadcast", events, before=True) - arc.at(f"{name}.x", events))
-    ax.plot(events, reached, color=color, label="broadcast", clip_on=False, **MARKER)
+    if events.size:
+        reached = np.abs(arc.at(f"{name}.broadcast", events, before=True) - arc.at(f"{name}.x", events))
+        ax.plot(events, reached, color=color, label="broadcast", clip_on=False, **MARKER)
     ax.set_ylim(bottom=0.0)
     ax.set_ylabel(f"error of agent {agent}")
     return _over_time(ax, scenario)
@@ -164,18 +166,22 @@ def _color(agent: int) -> str:
     return COLORS[(agent - 1) % len(COLORS)]
 
 
-def _over_time(ax: Axes, scenario: Scenario) -> Axes:
-    """Finish axes over the run: room between the axis and the fast start, and a legend that hides no curve."""
+def _over_time(ax: Axes, scenario: Scenario, words: Sequence[Line2D] = ()) -> Axes:
+    """Finish axes over the run: room between the axis and the fast start, and a legend that hides no curve.
+
+    `words` are further entries of the legend, of nothing that is drawn.
+    """
     ax.set_xlabel("time $t$ (s)")
     ax.set_xlim(0.0, scenario.stop_time)
     ax.spines["left"].set_position(("outward", 4.0))
-    handles, labels = ax.get_legend_handles_labels()
+    handles = [*ax.get_legend_handles_labels()[0], *words]
     if handles:
         ax.legend(
+            handles=handles,
             loc="lower right",
             bbox_to_anchor=(1.0, 1.0),
             borderaxespad=0.3,
-            ncols=len(labels) if len(labels) < 4 else (len(labels) + 1) // 2,
+            ncols=len(handles) if len(handles) < 4 else (len(handles) + 1) // 2,
             columnspacing=1.2,
             handlelength=1.4,
         )
