@@ -42,6 +42,7 @@ class System:
         self.slaves = {slave.name: slave for slave in slaves}
         if len(self.slaves) < len(slaves):
             raise MisfitError(f"two slaves have one name among {[slave.name for slave in slaves]}: name them apart.")
+        self._outputs = {f"{slave.name}.{port}": (slave, port) for slave in slaves for port in slave.outputs}
         self.connections = tuple(self._connection(target, source) for target, source in connections.items())
         self._from: dict[str, list[Connection]] = {name: [] for name in self.slaves}
         for connection in self.connections:
@@ -50,6 +51,24 @@ class System:
     def from_slave(self, name: str) -> list[Connection]:
         """Return the connections that start at a slave."""
         return self._from[name]
+
+    @property
+    def output_names(self) -> list[str]:
+        """Names of all outputs, ``slave.output``."""
+        return list(self._outputs)
+
+    def get(self, name: str) -> float:
+        """Return the present value of the output ``slave.output``.
+
+        Raises
+        ------
+        MisfitError
+            If there is none of that name.
+        """
+        if name not in self._outputs:
+            raise MisfitError(f"{name!r} is not an output; the outputs are {', '.join(self._outputs)}.")
+        slave, port = self._outputs[name]
+        return slave.get(port)
 
     def close(self) -> None:
         """Free everything the slaves hold."""

@@ -74,7 +74,7 @@ def _set_start(system: System, name: str, value: float) -> None:
 
 def _run(system: System, stop_time: float, options: argparse.Namespace) -> CosimResult:
     if options.master == "fixed-step":
-        return run_fixed_step(system, stop_time, options.step_size, record=True)
+        return run_fixed_step(system, stop_time, options.step_size, record=system.output_names)
     return run_event_exact(system, stop_time, output_interval=options.output_interval)
 
 

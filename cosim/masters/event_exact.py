@@ -58,7 +58,7 @@ def run_event_exact(
         start_slaves(system, t_start, t_stop, events=True)
         run.handle_events(t_start, set(system.slaves))
         if output_interval is not None:
-            sample(system, run.result, t_start)
+            sample(system, run.result, t_start, system.output_names)
         _advance(run, t_start, t_stop, output_interval)
         run.result.final = outputs(system)
     finally:
@@ -72,7 +72,7 @@ def _advance(run: _Run, t_start: float, t_stop: float, output_interval: float | 
         grid = t_stop if output_interval is None else min(t_start + k * output_interval, t_stop)
         run.advance_to(grid)
         if not run.ended and output_interval is not None:
-            sample(run.system, run.result, grid)
+            sample(run.system, run.result, grid, run.system.output_names)
         k += 1
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from cosim.masters.start import outputs, require_times, sample, start_slaves
 from cosim.result import CosimResult
@@ -10,7 +11,7 @@ from cosim.system import System
 
 
 def run_fixed_step(
-    system: System, t_stop: float, step: float, *, t_start: float = 0.0, record: bool = False
+    system: System, t_stop: float, step: float, *, t_start: float = 0.0, record: Sequence[str] = ()
 ) -> CosimResult:
     """Run a system with a fixed communication step; slaves handle their events inside.
 
@@ -24,8 +25,8 @@ def run_fixed_step(
         Times in s.
     step : float
         Communication step in s; the last one is shorter if it does not divide the run.
-    record : bool
-        Whether to keep all outputs at every communication point.
+    record : sequence of str
+        Outputs, ``slave.output``, to keep at every communication point.
 
     Returns
     -------
@@ -41,16 +42,14 @@ def run_fixed_step(
     result = CosimResult(t=t_start)
     try:
         start_slaves(system, t_start, t_stop, events=False)
-        if record:
-            sample(system, result, t_start)
+        sample(system, result, t_start, record)
         # Time by index: adding up steps would drift (rule 9).
         count = math.ceil((t_stop - t_start) / step * (1.0 - 1e-14))
         for k in range(count):
             t_next = t_stop if k == count - 1 else t_start + (k + 1) * step
             if not _step_all(system, result, t_next):
                 break
-            if record:
-                sample(system, result, t_next)
+            sample(system, result, t_next, record)
         result.final = outputs(system)
     finally:
         system.close()

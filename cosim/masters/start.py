@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from cosim.errors import CosimError
 from cosim.result import CosimResult
@@ -59,13 +60,13 @@ def transfer_start(
     return True
 
 
-def sample(system: System, result: CosimResult, t: float) -> None:
-    """Append all outputs at `t` to the result."""
+def sample(system: System, result: CosimResult, t: float, names: Sequence[str]) -> None:
+    """Append the named outputs at `t` to the result."""
     result.times.append(t)
-    for name, value in outputs(system).items():
-        result.signals.setdefault(name, []).append(value)
+    for name in names:
+        result.signals.setdefault(name, []).append(system.get(name))
 
 
 def outputs(system: System) -> dict[str, float]:
     """Return all outputs by ``slave.output``."""
-    return {f"{name}.{port}": slave.get(port) for name, slave in system.slaves.items() for port in slave.outputs}
+    return {name: system.get(name) for name in system.output_names}
