@@ -1,0 +1,161 @@
+"""The command line as its users see it: output, exit status, sentences."""
+
+import csv
+import json
+
+import pytest
+
+from cosim.cli.main import main
+from fmu.export import export_fmu
+from hybrid_model.models import BouncingBall
+
+SMALL = """
+name = "small"
+stop_time = 5.0
+[network]
+agents = 3
+edges = [[1, 2], [2, 3]]
+initial = [1.0, 0.0, -0.4]
+[weights]
+kind = "constant"
+value = 1.0
+[trigger]
+kind = "static"
+threshold = 0.2
+"""
+
+
+@pytest.fixture
+def small(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    return str(path)
+
+
+def test_simulate_prints_one_run_object(small, capsys):
+    assert main(["simulate", small, "--json"]) == 0
+    run = json.loads(capsys.readouterr().out)
+    assert run["stop"] == "HORIZON"
+    assert run["events_total"] == sum(run["events_per_agent"]) == sum(map(len, run["event_times"])) > 5
+    assert sum(run["x_end"]) == pytest.approx(0.6, abs=1e-12)
+    assert {"min_gap", "edge_norm_end", "mean_drift"} <= run.keys()
+
+
+def test_engines_agree(small, capsys):
+    runs = []
+    for engine in ("automaton", "network"):
+        assert main(["simulate", small, "--json", "--engine", engine]) == 0
+        runs.append(json.loads(capsys.readouterr().out))
+    assert runs[0]["events_per_agent"] == runs[1]["events_per_agent"]
+    for first, second in zip(runs[0]["event_times"], runs[1]["event_times"], strict=True):
+        assert first == pytest.approx(second, abs=1e-9)
+
+
+def test_simulate_writes_run_and_trajectory(small, tmp_path, capsys):
+    assert main(["simulate", small, "--stop-time", "1.05", "--out", str(tmp_path / "out")]) == 0
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["scenario"] == "small"
+    with (tmp_path / "out" / "trajectory.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["time"]) for row in rows] == pytest.approx([*(0.1 * k for k in range(11)), 1.05])
+    assert float(rows[0]["agent1.x"]) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["simulate", "nowhere"], "no preset 'nowhere'"),
+        (["simulate", "missing.toml"], "missing.toml"),
+        (["export", "no.such.module:Thing", "--out", "out"], "cannot be found"),
+        (["export", "json:JSONDecoder", "--out", "out"], "is not an automaton class"),
+    ],
+)
+def test_wrong_usage_is_status_2_and_one_sentence(arguments, sentence, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert sentence in captured.err
+    assert captured.err.count("\n") == 1
+    assert captured.out == ""
+
+
+@pytest.mark.parametrize("arguments", [["bogus"], ["simulate"], ["simulate", "paper-a", "--stop", "1"]])
+def test_unknown_commands_and_options_are_status_2(arguments, capsys):
+    with pytest.raises(SystemExit) as exit_:
+        main(arguments)
+    assert exit_.value.code == 2
+
+
+def test_unknown_keys_of_a_scenario_are_named(small, capsys):
+    with open(small, "a") as file:
+        file.write("decya = 0.1\n")
+    assert main(["simulate", small]) == 2
+    assert "decya" in capsys.readouterr().err
+
+
+def test_export_of_a_class_and_run_of_its_fmu(tmp_path, capsys):
+    target = "hybrid_model.consensus.agents:Integrator"
+    assert main(["export", target, "--start-value", "degree=2", "--out", str(tmp_path)]) == 0
+    fmu = capsys.readouterr().out.strip()
+    assert fmu == str(tmp_path / "Integrator.fmu")
+    table = tmp_path / "out.csv"
+    arguments = ["cosim", fmu, "--stop-time", "1", "--start-value", "x=3", "--output-file", str(table)]
+    assert main(arguments) == 0
+    with table.open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 11
+    assert float(rows[-1]["Integrator.x"]) == 3.0
+
+
+def test_a_scenario_exports_one_fmu_an_agent(small, tmp_path, capsys):
+    assert main(["export", small, "--out", str(tmp_path / "fmus")]) == 0
+    assert sorted(path.name for path in (tmp_path / "fmus").iterdir()) == ["agent1.fmu", "agent2.fmu", "agent3.fmu"]
+
+
+@pytest.mark.parametrize("master", ["event-exact", "fixed-step"])
+def test_zeno_is_status_3(master, tmp_path, capsys):
+    fmu = export_fmu(BouncingBall(), tmp_path / "ball.fmu")
+    assert main(["cosim", str(fmu), "--stop-time", "5", "--master", master]) == 3
+    assert "accumulate at t = 2.5586" in capsys.readouterr().out
+
+
+def test_an_fmu_without_a_proposed_stop_time_needs_one(tmp_path, capsys):
+    fmu = export_fmu(BouncingBall(), tmp_path / "ball.fmu")
+    assert main(["cosim", str(fmu)]) == 2
+    assert "give --stop-time" in capsys.readouterr().err
+
+
+def test_a_file_that_is_no_fmu_is_status_1(tmp_path, capsys):
+    (tmp_path / "broken.fmu").write_text("nothing")
+    assert main(["cosim", str(tmp_path / "broken.fmu"), "--stop-time", "1"]) == 1
+    assert "cannot be read as an FMU" in capsys.readouterr().err
+
+
+def test_unknown_start_values_are_errors(tmp_path, capsys):
+    fmu = export_fmu(BouncingBall(), tmp_path / "ball.fmu")
+    assert main(["cosim", str(fmu), "--stop-time", "1", "--start-value", "height=2"]) == 1
+    assert "no variable 'height'" in capsys.readouterr().err
+    assert main(["cosim", str(fmu), "--stop-time", "1", "--start-value", "h"]) == 2
+    assert "not NAME=VALUE" in capsys.readouterr().err
+
+
+def test_paper_reproduces_compares_and_draws(tmp_path, capsys):
+    assert main(["paper", "--out", str(tmp_path)]) == 0
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["scenario"] == "paper-a"
+    expected = {"static": [2, 6, 13, 4], "dynamic": [4, 10, 13, 8]}
+    for kind, events in expected.items():
+        assert summary["runs"][kind]["events_per_agent"] == events
+        assert summary["runs"][kind]["mean_drift"] < 1e-12
+        cosim = summary["cosim"][kind]
+        assert cosim["fmi"] == "3.0"
+        assert all((tmp_path / name).is_file() for name in cosim["fmus"])
+        assert cosim["events_total"] == sum(events)
+        assert cosim["max_event_time_difference"] < 1e-7
+        assert cosim["max_state_difference"] < 1e-8
+        assert all(trial["max_final_state_difference"] > 1e-3 for trial in cosim["fixed_step"])
+        assert summary["certificates"][kind]["valid"]["rate"] == pytest.approx(1.2112e-4, rel=1e-4)
+        for figure in ("states", "edge_norm"):
+            assert (tmp_path / f"{kind}_{figure}.png").stat().st_size > 10_000
+            assert (tmp_path / f"{kind}_{figure}.pdf").stat().st_size > 3_000
+    table = capsys.readouterr().out
+    assert "FMUs through fmpy                35  4, 10, 13, 8" in table
