@@ -26,8 +26,8 @@ from hybrid_model.consensus.scenario import load_scenario
 from hybrid_model.consensus.scenario_data import replace_trigger
 from hybrid_model.plots import JOURNAL
 
-# In 1/s: no state is faster, for two neighbours, weights up to 4 and differences of states up to 1.7. A broadcast is late
-# by at most the run's location tolerance, and the error above the threshold by at most this times that.
+# In 1/s: no state is faster, for two neighbours, weights up to 4 and differences of states up to 1.7. A broadcast is
+# late by at most the run's location tolerance, so the error exceeds the threshold by at most this times that.
 SPEED = 14.0
 
 
