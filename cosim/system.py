@@ -30,7 +30,8 @@ class System:
     slaves : sequence of Slave
         With distinct names; the order is the order in which simultaneous events are handled.
     connections : mapping
-        ``"slave.input"`` -> ``"slave.output"``; inputs not named keep their start values.
+        ``"slave.input"`` -> ``"slave.output"``, or a sequence of such names for the elements of a vector input; inputs
+        not named keep their start values.
 
     Raises
     ------
@@ -38,12 +39,17 @@ class System:
         For unknown names, two slaves of one name, units that differ, or a continuous signal on a discrete input.
     """
 
-    def __init__(self, slaves: Sequence[Slave], connections: Mapping[str, str]) -> None:
+    def __init__(self, slaves: Sequence[Slave], connections: Mapping[str, str | Sequence[str]]) -> None:
         self.slaves = {slave.name: slave for slave in slaves}
         if len(self.slaves) < len(slaves):
             raise MisfitError(f"two slaves have one name among {[slave.name for slave in slaves]}: name them apart.")
         self._outputs = {f"{slave.name}.{port}": (slave, port) for slave in slaves for port in slave.outputs}
-        self.connections = tuple(self._connection(target, source) for target, source in connections.items())
+        self.connections = tuple(
+            self._connection(target, source)
+            for vector, sources in connections.items()
+            for target, source in _elements(vector, sources)
+        )
+        self._refuse_doubles()
         self._from: dict[str, list[Connection]] = {name: [] for name in self.slaves}
         for connection in self.connections:
             self._from[connection.source].append(connection)
@@ -89,6 +95,13 @@ class System:
             )
         return Connection(out_of.name, output_port.name, into.name, input_port.name)
 
+    def _refuse_doubles(self) -> None:
+        driven: dict[tuple[str, str], Connection] = {}
+        for connection in self.connections:
+            first = driven.setdefault((connection.target, connection.input), connection)
+            if first is not connection:
+                raise MisfitError(f"{first} and {connection} drive one input: leave one of them out.")
+
     def _find(self, scoped: str, what: str) -> tuple[Slave, Port]:
         owner = next((n for n in sorted(self.slaves, key=len, reverse=True) if scoped.startswith(n + ".")), None)
         if owner is None:
@@ -99,3 +112,9 @@ class System:
         if name not in ports:
             raise MisfitError(f"{scoped} is not an {what}; the {what}s of {owner} are {', '.join(ports) or 'none'}.")
         return slave, ports[name]
+
+
+def _elements(target: str, sources: str | Sequence[str]) -> list[tuple[str, str]]:
+    if isinstance(sources, str):
+        return [(target, sources)]
+    return [(f"{target}[{k}]", source) for k, source in enumerate(sources, start=1)]

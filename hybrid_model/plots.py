@@ -15,8 +15,9 @@ from hybrid_model.arc import HybridArc
 from hybrid_model.variables import FloatArray
 
 JOURNAL: dict[RcKeyType, Any] = {
-    "font.family": "serif",
-    "mathtext.fontset": "cm",
+    # STIX for text and formulas, so that both have one weight; it comes with matplotlib.
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
     "font.size": 9,
     "axes.labelsize": 9,
     "legend.fontsize": 8,

@@ -7,8 +7,8 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from cosim.cli.agents import fmu_system
 from cosim.cli.exits import UsageError, exit_of, progress, start_values, write_csv
+from cosim.consensus import fmu_system
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult

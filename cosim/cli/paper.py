@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 import hybrid_model as hm
-from cosim.cli.agents import fmu_system, in_process_system, network_report
 from cosim.cli.exits import exit_of, progress
+from cosim.consensus import fmu_system, in_process_system, network_report
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult
 from fmu.export import Fmi, export_fmu

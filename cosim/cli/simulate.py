@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 import hybrid_model as hm
-from cosim.cli.agents import in_process_system, network_report
 from cosim.cli.exits import exit_of, write_csv
+from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
 from hybrid_model.consensus.network import agent_name, closed_loop
 from hybrid_model.consensus.report import RunReport, run_report

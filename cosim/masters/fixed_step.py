@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from cosim.errors import CosimError
 from cosim.masters.start import outputs, require_times, sample, start_slaves
 from cosim.result import CosimResult
 from cosim.system import System
@@ -39,6 +40,8 @@ def run_fixed_step(
         If a slave fails or the times make no sense.
     """
     require_times(t_start, t_stop, step, "communication step")
+    if isinstance(record, (bool, str)):
+        raise CosimError(f"record is {record!r}: give a list of outputs, for all of them system.output_names.")
     result = CosimResult(t=t_start)
     try:
         start_slaves(system, t_start, t_stop, events=False)

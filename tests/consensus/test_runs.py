@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from oracles.exact_consensus import exact_run
 
 import hybrid_model as hm
-from cosim.cli.agents import in_process_system, network_report
+from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
 from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.report import run_report

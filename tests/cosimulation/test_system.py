@@ -24,6 +24,7 @@ class Receiver(hm.HybridAutomaton):
     seconds = hm.Input(0.0, unit="s")
     gain = hm.Input(0.0)
     gain2 = hm.Input(0.0)
+    many = hm.Input([0.0, 0.0], discrete=True)
 
 
 def wire(connections):
@@ -52,6 +53,11 @@ def test_signals_that_fit_are_connected():
 def test_signals_that_do_not_fit_are_refused(target, source, sentence):
     with pytest.raises(MisfitError, match=sentence):
         wire({target: source})
+
+
+def test_an_input_driven_twice_is_refused():
+    with pytest.raises(MisfitError, match=r"sender.sent -> receiver.many\[1\] and sender.sent -> receiver.many\[1\]"):
+        wire({"receiver.many": ["sender.sent", "sender.sent"], "receiver.many[1]": "sender.sent"})
 
 
 def test_names_that_begin_alike_are_told_apart():

@@ -1,4 +1,4 @@
-"""The agents of a scenario as systems of slaves, in this process or as FMUs."""
+"""Agents of a consensus scenario as systems of slaves, in this process or as FMUs, and the report of their runs."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ CLOCK = "broadcast_clock"
 def in_process_system(scenario: Scenario) -> System:
     """Wire the agents of a scenario as automata in this process."""
     slaves = [AutomatonSlave(name, automaton) for name, automaton in scenario_agents(scenario).items()]
-    return System(slaves, _wires(scenario))
+    return System(slaves, broadcast_wires(scenario))
 
 
 def fmu_system(scenario: Scenario, fmus: Mapping[str, Path]) -> System:
     """Wire the agents of a scenario as FMUs, one file an agent."""
-    return System([FmuSlave(name, path) for name, path in fmus.items()], _wires(scenario))
+    return System([FmuSlave(name, path) for name, path in fmus.items()], broadcast_wires(scenario))
 
 
 def network_report(scenario: Scenario, result: CosimResult) -> RunReport:
@@ -43,11 +43,3 @@ def network_report(scenario: Scenario, result: CosimResult) -> RunReport:
         stop=result.ended.name,
         message=result.message or f"{scenario.name}: reached t = {result.t:.9g} s.",
     )
-
-
-def _wires(scenario: Scenario) -> dict[str, str]:
-    return {
-        f"{target}[{k + 1}]": source
-        for target, sources in broadcast_wires(scenario).items()
-        for k, source in enumerate(sources)
-    }
