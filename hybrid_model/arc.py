@@ -13,7 +13,7 @@ import numpy.typing as npt
 from hybrid_model.errors import DeclarationError
 from hybrid_model.flow import FlowPiece
 from hybrid_model.layout import Layout
-from hybrid_model.variables import FloatArray, Kind, Values, element_names, unknown_name
+from hybrid_model.variables import FloatArray, Kind, Values, Variable, element_names, unknown_name
 
 if TYPE_CHECKING:
     from hybrid_model.execution import Execution, JumpRecord
@@ -124,7 +124,8 @@ class HybridArc:
             For an unknown name or a time outside the run.
         """
         times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        if times.size and (times.min() < self.t[0] or times.max() > self.t[-1]):
+        # Written so that a time that is not a number is outside as well.
+        if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
             raise DeclarationError(
                 f"a time in [{times.min():g}, {times.max():g}] s lies outside the run, "
                 f"which covers [{self.t[0]:g}, {self.t[-1]:g}] s."
@@ -133,8 +134,7 @@ class HybridArc:
         for time in times.ravel():
             flow = self._flow_at(float(time), before)
             values.append(self._value(name, float(time), flow.at(float(time)), flow.z))
-        array = np.array(values, dtype=np.float64)
-        return array.reshape(np.shape(t) + array.shape[1:])
+        return np.array(values, dtype=np.float64).reshape(np.shape(t) + self._variable(name).shape)
 
     def event_times(self, name: str) -> FloatArray:
         """Return the times in s of the jumps called `name`."""
@@ -159,12 +159,13 @@ class HybridArc:
 
     def scalar_names(self, name: str) -> list[str]:
         """Return the names of a variable's elements: ``x``, or ``w[1]``, ``w[2]``."""
-        variable = next((v for v in self.automaton.variables if v.name == name), None)
-        if variable is None:
-            raise DeclarationError(
-                unknown_name(self.automaton.name, name, {v.name: v for v in self.automaton.variables})
-            )
-        return element_names(variable)
+        return element_names(self._variable(name))
+
+    def _variable(self, name: str) -> Variable:
+        known = {variable.name: variable for variable in self.automaton.variables}
+        if name not in known:
+            raise DeclarationError(unknown_name(self.automaton.name, name, known))
+        return known[name]
 
     def _flow_at(self, t: float, before: bool) -> FlowRecord:
         if before:

@@ -13,6 +13,8 @@ import numpy as np
 from hybrid_model.errors import DeclarationError
 from hybrid_model.variables import Declaration, Dimension, Kind, Value, Values, Variable
 
+RESERVED = ("t", "jump_set", "jump_map")
+"""Names with a meaning that no attribute of `HybridAutomaton` holds."""
 Assignments = Mapping[str, Value]
 """Variable name -> value: what flow, jump, start and output maps return."""
 
@@ -330,6 +332,13 @@ class HybridAutomaton(Automaton):
                 f"{what} of {self.name} is a boolean: return a margin instead, a number that is zero or above inside "
                 "the set (for h <= 0 return -h; join conditions with least for 'and', greatest for 'or')."
             )
+        if margin is None:
+            raise DeclarationError(f"{what} of {self.name} is None: return a margin, zero or above inside the set.")
+        if isinstance(margin, np.ndarray) and margin.ndim > 0:
+            raise DeclarationError(
+                f"{what} of {self.name} has shape {margin.shape}, but a margin is a scalar: join the elements with "
+                "np.min for 'all of them', np.max for 'any of them'."
+            )
         return margin
 
 
@@ -339,7 +348,7 @@ def _declared(cls: type, kind: type) -> dict[str, Any]:
     for base in reversed(cls.__mro__):
         for key, value in vars(base).items():
             if isinstance(value, kind):
-                if key == "t" or hasattr(HybridAutomaton, key) or key in Automaton.__annotations__:
+                if key in RESERVED or hasattr(HybridAutomaton, key) or key in Automaton.__annotations__:
                     raise DeclarationError(f"{cls.__name__} declares {key!r}, a name of the framework: choose another.")
                 found[key] = value
     return found
@@ -351,7 +360,7 @@ def _sizes(
     """Find the length of each dimension, from its own value or from the vectors given."""
     sizes: dict[str, int] = {}
     for dimension in dimensions:
-        lengths = {dimension: int(values[dimension])} if dimension in values else {}
+        lengths = {dimension: _length(owner, dimension, values[dimension])} if dimension in values else {}
         for key, declaration in declarations.items():
             given = np.shape(values[key]) if key in values else ()
             if dimension in declaration.shape and len(given) == len(declaration.shape):
@@ -363,3 +372,15 @@ def _sizes(
             raise DeclarationError(f"{owner} has one length {dimension!r}, but {told}: make them equal.")
         sizes[dimension] = next(iter(lengths.values()))
     return sizes
+
+
+def _length(owner: str, dimension: str, value: Any) -> int:
+    try:
+        length = int(value)
+    except (TypeError, ValueError, OverflowError):
+        length = -1
+    if length < 0 or length != value:
+        raise DeclarationError(
+            f"{owner}: the length {dimension} = {value!r} is not possible: give a whole number >= 0."
+        )
+    return length

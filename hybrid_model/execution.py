@@ -134,9 +134,7 @@ class Execution:
         if not self.automaton.jumps:
             return None
         s = self.values()
-        with np.errstate(all="ignore"):
-            margins = iter(self.automaton.jump_margins(s))
-            times = iter(self.automaton.event_times(s))
+        margins, times = iter(self.jump_margins(s)), iter(self.event_times(s))
         may_jump = self.automaton.priority is Priority.JUMP or self._left_flow_set or not self.in_flow_set(0.0)
         for index, info in enumerate(self.automaton.jumps):
             if info.trigger is Trigger.STATE:
@@ -165,25 +163,58 @@ class Execution:
         record = JumpRecord(self.t, self.j, index, info.name, x, z, self.x, self.z)
         self.j += 1
         self._left_flow_set = False
-        if info.trigger is Trigger.TIME:
+        on_state = info.trigger is Trigger.STATE
+        if not on_state:
             self._require_progress(index, before)
-        else:
-            message = self.monitor.record(self.automaton.name, info.name, self.t)
-            if message:
-                self.stopped, self.message = Stop.ZENO, message
+        message = self.monitor.record(self.automaton.name, info.name, self.t, on_state=on_state)
+        if message:
+            self.stopped, self.message = Stop.ZENO, message
         return record
 
     def in_flow_set(self, tolerance: float) -> bool:
         """Whether the state lies in the flow set, or outside by no more than `tolerance`."""
-        return not self.automaton.has_flow_set or bool(self.automaton.flow_margin(self.values()) >= -tolerance)
+        return not self.automaton.has_flow_set or self.flow_margin(self.values()) >= -tolerance
+
+    # Margins and times, which must be numbers (rule 10).
+
+    def jump_margins(self, s: Values) -> list[float]:
+        """Return the margins of the jumps on state."""
+        with np.errstate(all="ignore"):
+            margins = [float(margin) for margin in self.automaton.jump_margins(s)]
+        return self._require_numbers(margins, Trigger.STATE, "margin", s)
+
+    def event_times(self, s: Values) -> list[float]:
+        """Return the absolute times in s of the jumps on time."""
+        with np.errstate(all="ignore"):
+            times = [float(time) for time in self.automaton.event_times(s)]
+        return self._require_numbers(times, Trigger.TIME, "time", s)
+
+    def flow_margin(self, s: Values) -> float:
+        """Return the margin of the flow set."""
+        with np.errstate(all="ignore"):
+            margin = float(self.automaton.flow_margin(s))
+        if math.isnan(margin):
+            raise SimulationError(
+                f"{self.automaton.name}: the margin of the flow set is not a number at t = {s['t']:.9g} s: it must "
+                "be defined wherever a flow or a jump leads."
+            )
+        return margin
+
+    def _require_numbers(self, numbers: list[float], trigger: Trigger, what: str, s: Values) -> list[float]:
+        if any(map(math.isnan, numbers)):
+            names = [info.name for info in self.automaton.jumps if info.trigger is trigger]
+            name = next(name for name, number in zip(names, numbers, strict=True) if math.isnan(number))
+            raise SimulationError(
+                f"{self.automaton.name}: the {what} of jump {name!r} is not a number at t = {s['t']:.9g} s: it must be "
+                "defined wherever a flow or a jump leads."
+            )
+        return numbers
 
     # Flow.
 
     def next_time_event(self) -> float:
         """Return the earliest known time, in s, at which a time event or an input's breakpoint comes."""
-        s = self.values()
-        times = [float(time) for time in self.automaton.event_times(s)]
-        return min([*times, self.inputs.next_breakpoint(self.t)])
+        return min([*self.event_times(self.values()), self.inputs.next_breakpoint(self.t)])
 
     def flow(self, limit: float) -> list[FlowPiece]:
         """Flow to the first event or to `limit`, whichever comes first, and never across a time event (rule 5).
@@ -208,7 +239,9 @@ class Execution:
             return []
         pieces, left = integrate(self, min(limit, self.next_time_event()))
         self._left_flow_set = left
-        if left and self.due() is None:
+        tolerance = self.solver.event_tolerance
+        # Under flow priority a state that is outside by rounding flows on while it stays so (rule 3).
+        if left and self.due() is None and not self.flow_margin(self.values()) > -tolerance:
             self._block("the flow left the flow set, and the state is not in the jump set")
         return pieces
 
@@ -225,7 +258,7 @@ class Execution:
     def _block(self, what: str) -> None:
         self.stopped = Stop.BLOCKED
         state = self.layout.describe({Kind.STATE: self.x, Kind.DISCRETE: self.z})
-        margin = float(self.automaton.flow_margin(self.values()))
+        margin = self.flow_margin(self.values())
         self.message = (
             f"{self.automaton.name}: {what} at t = {self.t:.9g} s: {state}; margin of the flow set {margin:.3g}. "
             "Enlarge one of the sets, or make the jump map land in their union."
@@ -239,10 +272,10 @@ class Execution:
     def _require_progress(self, index: int, before: Values) -> None:
         infos = self.automaton.jumps
         at = sum(info.trigger is Trigger.TIME for info in infos[:index])
-        was = self.automaton.event_times(before)[at]
-        now = self.automaton.event_times(self.values())[at]
+        was = self.event_times(before)[at]
+        now = self.event_times(self.values())[at]
         if not now > was:
             raise SimulationError(
-                f"{self.automaton.name}: time event {infos[index].name!r} was due at {float(was):.9g} s and after its "
-                f"jump is due at {float(now):.9g} s: its jump map must move its time on."
+                f"{self.automaton.name}: time event {infos[index].name!r} was due at {was:.9g} s and after its "
+                f"jump is due at {now:.9g} s: its jump map must move its time on."
             )

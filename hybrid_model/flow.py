@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid_model.automaton import Priority
+from hybrid_model.automaton import Priority, Trigger
 from hybrid_model.errors import SimulationError
 from hybrid_model.layout import not_finite
-from hybrid_model.locate import first_nonnegative, rise_in_samples, ulp
+from hybrid_model.locate import first_nonnegative, rise_in_samples, scan_times, ulp
 from hybrid_model.variables import FloatArray, Kind
 
 if TYPE_CHECKING:
@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 
 SHORTEST = 16.0
 """Pieces shorter than this many ulp of t are made in one explicit Euler step: no stepper can subdivide them."""
+FLOW_FIRST_SLACK = 1e-15
+"""Under flow priority a flow set is left when its margin is below zero by this: at zero the state is still in it."""
+ATTEMPTS = 1000
+"""Evaluations, a state, after which a step that has met a derivative that is not finite is given up: a stepper that
+halves its step to nothing needs hundreds, and LSODA would try the same step for ever."""
 STATELESS_STEPS = 200
 """Steps over a flow without continuous states, where no error estimate limits them."""
 
@@ -64,7 +69,7 @@ def integrate(execution: Execution, end: float) -> tuple[list[FlowPiece], bool]:
     pieces: list[FlowPiece] = []
     watch = _Watch(execution)
     if end - execution.t <= SHORTEST * ulp(end):
-        x1 = execution.x + (end - execution.t) * _derivative(execution, end)(execution.t, execution.x)
+        x1 = execution.x + (end - execution.t) * _FlowMap(execution, end)(execution.t, execution.x)
         return [_move(execution, _straight(execution.t, end, execution.x, x1))], False
     for piece in _steps(execution, end):
         found = watch.first_event(piece, end)
@@ -91,16 +96,36 @@ def _straight(t0: float, t1: float, x0: FloatArray, x1: FloatArray) -> FlowPiece
     return FlowPiece(t0, t1, x0, x1, lambda t: x0 + (x1 - x0) * ((t - t0) / span))
 
 
-def _derivative(execution: Execution, end: float) -> Callable[[float, FloatArray], FloatArray]:
-    layout, automaton = execution.layout, execution.automaton
-    # Inputs are continuous from the right: the last stage of a step that ends at a breakpoint belongs to the left side.
-    last = float(np.nextafter(end, -np.inf)) if execution.inputs.vary else end
+class _FlowMap:
+    """The derivative as steppers call it; it remembers values that are not finite.
 
-    def flow_map(t: float, x: FloatArray) -> FloatArray:
+    A stepper may try a point outside the flow set and come back with a shorter step, so one such value is no error yet.
+    """
+
+    def __init__(self, execution: Execution, end: float) -> None:
+        self._execution = execution
+        # Inputs are continuous from the right: the last stage of a step that ends at a breakpoint belongs to the left.
+        self._last = float(np.nextafter(end, -np.inf)) if execution.inputs.vary else end
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew: a step was accepted."""
+        self.trouble = ""
+        self._count = 0
+
+    def __call__(self, t: float, x: FloatArray) -> FloatArray:
+        execution = self._execution
         with np.errstate(all="ignore"):
-            return layout.pack(Kind.STATE, automaton.derivatives(execution.values_at(min(t, last), x)))
-
-    return flow_map
+            s = execution.values_at(min(t, self._last), x)
+            rates = execution.layout.pack(Kind.STATE, execution.automaton.derivatives(s))
+        if not np.all(np.isfinite(rates)):
+            names = [f"derivative of {name}" for name in execution.layout.names(Kind.STATE)]
+            self.trouble = f"{not_finite(names, rates)} at t = {t:.9g} s"
+        if self.trouble:
+            self._count += 1
+            if self._count > ATTEMPTS * (1 + rates.size):
+                raise SimulationError(_failure(execution, self, t, x, None))
+        return rates
 
 
 def _steps(execution: Execution, end: float) -> Any:
@@ -109,7 +134,11 @@ def _steps(execution: Execution, end: float) -> Any:
     if execution.x.size == 0:
         yield from _stateless_steps(execution, end)
         return
-    flow_map = _derivative(execution, end)
+    flow_map = _FlowMap(execution, end)
+    # Not left to the steppers: with a first derivative that is not a number some of them never return.
+    flow_map(execution.t, execution.x)
+    if flow_map.trouble:
+        raise SimulationError(_failure(execution, flow_map, execution.t, execution.x, None))
     first = min(execution.next_step, end - execution.t) if execution.next_step else None
     stepper = options.method.value(
         flow_map,
@@ -123,9 +152,15 @@ def _steps(execution: Execution, end: float) -> Any:
     )
     while stepper.status == "running":
         t0, x0 = stepper.t, stepper.y
-        problem = stepper.step()
-        if stepper.status == "failed":
-            raise SimulationError(_failure(execution, flow_map, stepper.t, stepper.y, problem))
+        flow_map.forget()
+        try:
+            problem = stepper.step()
+        except ValueError as error:
+            # The linear algebra of the implicit methods refuses what is not finite.
+            raise SimulationError(_failure(execution, flow_map, t0, x0, str(error))) from error
+        # LSODA calls a step done that went nowhere.
+        if stepper.status == "failed" or not stepper.t > t0:
+            raise SimulationError(_failure(execution, flow_map, t0, x0, problem or "the step length fell to zero"))
         execution.next_step = getattr(stepper, "h_abs", None)
         yield FlowPiece(t0, stepper.t, x0, stepper.y, stepper.dense_output())
 
@@ -137,10 +172,8 @@ def _stateless_steps(execution: Execution, end: float) -> Any:
         yield _straight(float(t0), float(t1), execution.x, execution.x)
 
 
-def _failure(execution: Execution, flow_map: Any, t: float, x: FloatArray, problem: str | None) -> str:
-    names = execution.layout.names(Kind.STATE)
-    bad = not_finite([f"derivative of {name}" for name in names], flow_map(t, x))
-    why = f"{bad}; the flow map must give finite numbers in the flow set" if bad else problem
+def _failure(execution: Execution, flow_map: _FlowMap, t: float, x: FloatArray, problem: str | None) -> str:
+    why = f"{flow_map.trouble}; the flow map must give finite numbers in the flow set" if flow_map.trouble else problem
     state = execution.layout.describe({Kind.STATE: x, Kind.DISCRETE: execution.z})
     return f"{execution.automaton.name}: the flow cannot go on at t = {t:.9g} s ({state}): {why}."
 
@@ -152,39 +185,37 @@ class _Watch:
         automaton = execution.automaton
         self._execution = execution
         self._tolerance = execution.solver.event_tolerance
+        self._guards = sum(info.trigger is Trigger.STATE for info in automaton.jumps)
+        rows = range(self._guards + automaton.has_flow_set)
+        # Under flow priority only the exit counts, and it counts at once; else, and for a state that rounding has put
+        # outside already, it counts beyond the tolerance.
         flow_first = automaton.priority is Priority.FLOW
-        # Under flow priority only the exit counts, and it counts at once; else rounding may leave the state outside.
-        self._slack = 1e-15 if flow_first else self._tolerance
-        self._guards = 0 if flow_first else sum(1 for _ in automaton.jump_margins(execution.values()))
-        self._rows = self._guards + automaton.has_flow_set
+        self._watched = rows[self._guards :] if flow_first else rows
+        self._slack = FLOW_FIRST_SLACK if flow_first and execution.in_flow_set(0.0) else self._tolerance
         self._last: tuple[float, FloatArray] | None = None
 
     def _margins(self, t: float, x: FloatArray) -> FloatArray:
         """Return the jump margins and, last, the margin by which the flow set is left."""
-        automaton = self._execution.automaton
-        s = self._execution.values_at(t, x)
-        with np.errstate(all="ignore"):
-            row = [float(m) for m in automaton.jump_margins(s)] if self._guards else []
-            if automaton.has_flow_set:
-                row.append(-float(automaton.flow_margin(s)) - self._slack)
-        margins = np.array(row)
-        if np.any(np.isnan(margins)):
-            raise SimulationError(
-                f"{automaton.name}: a margin is not a number at t = {t:.9g} s: margins must be defined on every flow."
-            )
-        return margins
+        execution = self._execution
+        s = execution.values_at(t, x)
+        row = execution.jump_margins(s)
+        if execution.automaton.has_flow_set:
+            row.append(-execution.flow_margin(s) - self._slack)
+        return np.array(row)
 
     def first_event(self, piece: FlowPiece, end: float) -> tuple[float, bool] | None:
         """Return the time of the first event in a step, and whether it is an exit from the flow set."""
-        if self._rows == 0:
+        if not self._watched:
             return None
-        times = np.linspace(piece.t0, piece.t1, self._execution.solver.scan_points + 2)
+        times = scan_times(piece.t0, piece.t1, self._execution.solver.scan_points)
         first = self._last[1] if self._last and self._last[0] == piece.t0 else self._margins(piece.t0, piece.x0)
         table = np.array([first, *(self._margins(float(t), piece.at(float(t))) for t in times[1:])])
         self._last = (piece.t1, table[-1])
+        if self._execution.automaton.has_flow_set and table[0, -1] >= 0.0:
+            return piece.t0, True
         found = [
             (first_nonnegative(margin, *bracket), row)
-            for row in range(self._rows)
+            for row in self._watched
             for margin in [self._along(piece, row)]
             for bracket in [rise_in_samples(times, table[:, row], margin)]
             if bracket is not None
@@ -192,9 +223,7 @@ class _Watch:
         if not found:
             return None
         t, row = min(found)
-        if row >= self._guards:
-            return t, True
-        return self._latest_of_simultaneous(piece, t, end), False
+        return self._latest_of_simultaneous(piece, t, end), row >= self._guards
 
     def _along(self, piece: FlowPiece, row: int) -> Callable[[float], float]:
         def margin(t: float) -> float:

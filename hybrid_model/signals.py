@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from hybrid_model.errors import DeclarationError, SimulationError
-from hybrid_model.layout import Layout
-from hybrid_model.variables import FloatArray, Kind, start_array, unknown_name
+from hybrid_model.layout import Layout, Place
+from hybrid_model.variables import FloatArray, Kind, Variable, start_array, unknown_name
 
 
 @dataclass(frozen=True)
@@ -52,17 +52,17 @@ class Inputs:
     def __init__(self, layout: Layout, given: Mapping[str, InputValue] | None = None) -> None:
         self._layout = layout
         self._held = layout.start(Kind.INPUT)
-        self._signals: list[tuple[slice, str, Callable[[float], npt.ArrayLike]]] = []
+        self._signals: list[tuple[Place, Callable[[float], npt.ArrayLike]]] = []
         breakpoints: list[float] = []
         places = {place.variable.name: place for place in layout.places[Kind.INPUT]}
         for name, value in (given or {}).items():
             if name not in places:
                 raise DeclarationError(unknown_name(f"{layout.automaton.name} (inputs)", name, places))
             if isinstance(value, Signal):
-                self._signals.append((places[name].at, name, value.value))
-                breakpoints += [float(b) for b in value.breakpoints]
+                self._signals.append((places[name], value.value))
+                breakpoints += _finite_breakpoints(name, value)
             elif callable(value):
-                self._signals.append((places[name].at, name, value))
+                self._signals.append((places[name], value))
             else:
                 self.hold(name, value)
         self._breakpoints = sorted(breakpoints)
@@ -74,14 +74,14 @@ class Inputs:
             raise DeclarationError(
                 unknown_name(f"{self._layout.automaton.name} (inputs)", name, dict.fromkeys(self.names))
             )
-        before = self._held[place.at].copy()
         given = start_array(f"{self._layout.automaton.name}.{name}", value)
         if given.shape not in ((), place.variable.shape):
             raise DeclarationError(
                 f"input {name} has shape {place.variable.shape}, but the value given has shape {given.shape}."
             )
+        before, self._held = self._held, self._held.copy()
         self._held[place.at] = given.ravel() if given.shape else given
-        return not np.array_equal(before, self._held[place.at])
+        return not np.array_equal(before, self._held)
 
     def hold_element(self, index: int, value: float) -> bool:
         """Set one scalar of u to a constant; return whether that changed it."""
@@ -106,10 +106,8 @@ class Inputs:
         if not self._signals:
             return self._held
         u = self._held.copy()
-        for place, name, signal in self._signals:
-            u[place] = np.ravel(signal(t))
-            if not np.all(np.isfinite(u[place])):
-                raise SimulationError(f"input {name} is {u[place]} at t = {t:.9g} s: inputs must be finite.")
+        for place, signal in self._signals:
+            u[place.at] = _sample(place.variable, signal, t)
         return u
 
     def next_breakpoint(self, t: float) -> float:
@@ -124,3 +122,26 @@ class Inputs:
         other._signals = self._signals
         other._breakpoints = self._breakpoints
         return other
+
+
+def _finite_breakpoints(name: str, signal: Signal) -> list[float]:
+    breakpoints = [float(b) for b in signal.breakpoints]
+    if not all(map(math.isfinite, breakpoints)):
+        raise DeclarationError(f"input {name} has the breakpoints {breakpoints}: give finite times in s.")
+    return breakpoints
+
+
+def _sample(variable: Variable, signal: Callable[[float], npt.ArrayLike], t: float) -> FloatArray:
+    given = signal(t)
+    try:
+        value = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise SimulationError(f"input {variable.name} is {given!r} at t = {t:.9g} s: return numbers.") from error
+    if value.shape not in ((), variable.shape):
+        raise SimulationError(
+            f"input {variable.name} has shape {variable.shape}, but its function gives shape {value.shape} at "
+            f"t = {t:.9g} s: return one number for all elements, or an array of shape {variable.shape}."
+        )
+    if not np.all(np.isfinite(value)):
+        raise SimulationError(f"input {variable.name} is {value} at t = {t:.9g} s: inputs must be finite.")
+    return value.ravel() if value.shape else value

@@ -66,7 +66,7 @@ def simulate(
         if index is not None:
             jumps.append(execution.jump(index))
             flows.append(FlowRecord(execution.t, execution.x, execution.z, ()))
-        elif execution.t >= t_end:
+        elif execution.t >= t_end and execution.in_flow_set(execution.solver.event_tolerance):
             execution.stopped, execution.message = Stop.HORIZON, f"{automaton.name}: reached t = {t_end:.9g} s."
         else:
             pieces = execution.flow(t_end)

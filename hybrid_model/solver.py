@@ -42,7 +42,7 @@ class Solver:
     Raises
     ------
     SimulationError
-        If a number is not positive.
+        If a number is not positive, a tolerance is not finite, or `scan_points` is not whole.
     """
 
     method: Method = Method.DOP853
@@ -55,5 +55,7 @@ class Solver:
     def __post_init__(self) -> None:
         for name in ("rtol", "atol", "max_step", "scan_points", "event_tolerance"):
             value = getattr(self, name)
-            if not value > 0:
+            if not value > 0 or (math.isinf(value) and name != "max_step"):
                 raise SimulationError(f"solver option {name} = {value}: give a positive number.")
+        if self.scan_points != int(self.scan_points):
+            raise SimulationError(f"solver option scan_points = {self.scan_points}: give a whole number.")

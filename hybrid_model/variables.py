@@ -131,6 +131,12 @@ class Declaration:
             If the value has the wrong shape or is not finite.
         """
         given = start_array(f"{owner}.{name}", value)
+        unknown = [dimension for dimension in self.shape if dimension not in sizes]
+        if unknown:
+            raise DeclarationError(
+                f"{owner}.{name} has the shape {self.shape}, but {unknown[0]!r} is not one of the dimensions of "
+                f"{owner}, which are {list(sizes)}: declare it with Dimension()."
+            )
         shape = tuple(sizes[d] for d in self.shape) if self.shape else np.shape(self.start)
         if given.shape not in ((), shape):
             raise DeclarationError(

@@ -6,16 +6,21 @@ import itertools
 from collections import deque
 from dataclasses import dataclass
 
+from hybrid_model.locate import ulp
+
 HISTORY = 12
 GAPS = 8
 """Ratios of successive gaps are compared over this many gaps: enough to tell geometric shrinking from chance."""
+RESOLVED = 1e4
+"""Gaps of fewer ulp than this have ratios that rounding blurs: an accumulation is judged before."""
 
 
 @dataclass(frozen=True)
 class ZenoGuard:
     """What counts as an accumulation of jumps (semantics: rules 7 and 8).
 
-    Only jumps on state margins are counted, each jump by itself: many agents that broadcast together are no Zeno.
+    Each jump is counted by itself: many agents that broadcast together are no Zeno. Jumps at known times are bounded
+    at one instant only: their times are the author's own, and move on.
 
     Attributes
     ----------
@@ -27,7 +32,7 @@ class ZenoGuard:
         See `window`.
     remainder : float
         In s; jumps whose gaps shrink geometrically end the run when the time left to the accumulation point, by the
-        sum of the geometric series, is below this.
+        sum of the geometric series, is below this (or below what floats at that time resolve well enough).
     spread : float
         Relative spread up to which successive ratios of gaps count as one.
     """
@@ -54,8 +59,17 @@ class ZenoMonitor:
         self._total: dict[str, int] = {}
         self._at_once: dict[str, tuple[float, int]] = {}
 
-    def record(self, automaton: str, jump: str, t: float) -> str | None:
+    def record(self, automaton: str, jump: str, t: float, *, on_state: bool = True) -> str | None:
         """Count a jump at time `t`.
+
+        Parameters
+        ----------
+        automaton, jump : str
+            Names, for the message.
+        t : float
+            Time in s.
+        on_state : bool
+            Whether a state margin triggered it; jumps at known times are counted at one instant only.
 
         Returns
         -------
@@ -66,12 +80,19 @@ class ZenoMonitor:
         last, count = self._at_once.get(jump, (t, 0))
         count = count + 1 if t == last else 1
         self._at_once[jump] = (t, count)
+        if count > self.guard.jumps_at_once and not on_state:
+            return (
+                f"{automaton}: {count} jumps of {jump!r} at one instant, t = {t:.9g} s: its time is still not after "
+                "the present. Let the jump map move the time on past it, or start with the next time to come."
+            )
         if count > self.guard.jumps_at_once:
             return (
                 f"{automaton}: {count} jumps of {jump!r} at one instant, t = {t:.9g} s: after the jump the state is "
                 "still in the jump set. Make the jump map leave the jump set, or let the margin be negative there "
                 "(a threshold that is zero together with its error fires for ever)."
             )
+        if not on_state:
+            return None
         recent = self._recent.setdefault(jump, deque(maxlen=max(HISTORY, self.guard.jumps_in_window)))
         recent.append(t)
         return self._crowded(automaton, jump, recent) or self._geometric(automaton, jump, recent)
@@ -83,7 +104,7 @@ class ZenoMonitor:
         if recent[-1] == recent[-n]:
             return None  # a cascade at one instant has its own, larger budget
         return (
-            f"{automaton}: {n} jumps of {jump!r} in {recent[-1] - recent[-n]:.2g} s around t = {recent[-1]:.9g} s: "
+            f"{automaton}: {n} jumps of {jump!r} in {recent[-1] - recent[-n]:.2g} s around t = {recent[-1]:.12g} s: "
             "jumps accumulate there. End the run before, or give the jump set a minimum dwell time."
         )
 
@@ -99,10 +120,10 @@ class ZenoMonitor:
         if max(ratios) >= 1.0 or max(ratios) - min(ratios) > self.guard.spread * ratio:
             return None
         left = gaps[-1] * ratio / (1.0 - ratio)
-        if left > self.guard.remainder * max(1.0, abs(times[-1])):
+        if left > max(self.guard.remainder, RESOLVED * ulp(times[-1])):
             return None
         return (
-            f"{automaton}: {self._total[jump]} jumps of {jump!r} accumulate at t = {times[-1] + left:.9g} s (the last "
+            f"{automaton}: {self._total[jump]} jumps of {jump!r} accumulate at t = {times[-1] + left:.12g} s (the last "
             f"gap was {gaps[-1]:.2g} s, each {ratio:.3f} times the one before). End the run before that time, or give "
             "the jump set a minimum dwell time."
         )

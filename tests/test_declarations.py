@@ -1,0 +1,286 @@
+"""Declarations: what may be declared, what an instance may be given, and the sentence for each mistake."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid_model as hm
+from hybrid_model.models import BouncingBall
+from hybrid_model.variables import Kind, element_names
+
+
+class Block(hm.HybridAutomaton):
+    n = hm.Dimension("length")
+    m = hm.Dimension()
+    x = hm.State(1.0, shape="n", unit="m", description="a vector")
+    a = hm.Parameter(0.0, shape=("m", "n"))
+    mode = hm.DiscreteState(0, integer=True, output=True)
+    u = hm.Input(0.0, shape="n", discrete=True)
+    y = hm.Output(shape="m", unit="N")
+
+    def flow_map(self, s):
+        return {"x": s.u}
+
+    def outputs(self, s):
+        return {"y": s.a @ s.x}
+
+
+def run(automaton, **options):
+    return hm.simulate(automaton, 1.0, **options)
+
+
+# What is right.
+
+
+def test_variables_keep_order_kind_unit_and_shape():
+    block = Block(n=3, m=2)
+    assert [(v.name, v.kind, v.shape) for v in block.variables] == [
+        ("x", Kind.STATE, (3,)),
+        ("a", Kind.PARAMETER, (2, 3)),
+        ("mode", Kind.DISCRETE, ()),
+        ("u", Kind.INPUT, (3,)),
+        ("y", Kind.OUTPUT, (2,)),
+    ]
+    assert (block.variables[0].unit, block.variables[0].description) == ("m", "a vector")
+    np.testing.assert_array_equal(block.variables[0].start, [1.0, 1.0, 1.0])
+    assert (block.variables[1].size, block.variables[2].integer, block.variables[3].discrete) == (6, True, True)
+
+
+def test_lengths_come_from_the_vectors_given():
+    block = Block(a=[[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
+    assert block.variables[0].shape == (2,)
+    assert run(block).end.x == pytest.approx([1.0, 1.0])
+    arc = run(block, inputs={"u": [1.0, -1.0]})
+    assert arc.at("y", 1.0) == pytest.approx([2.0, 6.0, 10.0], abs=1e-12)
+
+
+def test_a_scalar_stands_for_every_element():
+    np.testing.assert_array_equal(Block(n=2, m=1, x=7.0).variables[0].start, [7.0, 7.0])
+
+
+def test_length_zero_is_a_length():
+    assert run(Block(n=0, m=0)).end.x.shape == (0,)
+
+
+def test_element_names_count_from_one_row_by_row():
+    block = Block(n=2, m=2)
+    assert element_names(block.variables[1]) == ["a[1,1]", "a[1,2]", "a[2,1]", "a[2,2]"]
+    assert element_names(block.variables[0]) == ["x[1]", "x[2]"]
+    assert element_names(block.variables[2]) == ["mode"]
+
+
+def test_subclasses_inherit_declarations_first_and_may_change_start_values():
+    class Moon(BouncingBall):
+        g = hm.Parameter(1.62)
+        dust = hm.Parameter(0.1)
+
+    names = [v.name for v in Moon().variables]
+    assert names == [*(v.name for v in BouncingBall().variables), "dust"]
+    assert next(v for v in Moon().variables if v.name == "g").start == 1.62
+
+
+def test_instances_are_independent_and_named():
+    one, two = BouncingBall("one", h=2.0), BouncingBall()
+    assert (one.name, two.name) == ("one", "BouncingBall")
+    assert (float(one.variables[0].start), float(two.variables[0].start)) == (2.0, 1.0)
+
+
+def test_the_given_array_is_copied():
+    given = np.array([1.0, 2.0])
+    block = Block(m=1, x=given)
+    given[0] = 99.0
+    assert block.variables[0].start[0] == 1.0
+
+
+# Instances.
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"mass": 1.0}, r"BouncingBall has nothing named 'mass' to set; it has h, v, g, e\."),
+        ({"h": [1.0, 2.0]}, r"BouncingBall\.h has shape \(\), but the value given has shape \(2,\): give one number"),
+        ({"h": math.nan}, r"BouncingBall\.h = nan is not finite: start values and parameters must be finite"),
+        ({"e": "bouncy"}, r"BouncingBall\.e = 'bouncy' is not a number"),
+        ({"h": None}, r"BouncingBall\.h = None is not"),
+        ({"g": [[1.0], [1.0, 2.0]]}, r"BouncingBall\.g = .* is not a number or an array of numbers"),
+    ],
+)
+def test_values_of_an_instance(values, sentence):
+    with pytest.raises(hm.DeclarationError, match=sentence):
+        BouncingBall(**values)
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({}, r"Block needs the length 'n': give n=\.\.\., a whole number"),
+        ({"n": 2}, r"Block needs the length 'm'"),
+        ({"m": 1, "x": [1.0, 2.0], "u": [1.0]}, r"Block has one length 'n', but x says 2, u says 1: make them equal"),
+        ({"n": 3, "m": 1, "x": [1.0, 2.0]}, r"one length 'n', but n says 3, x says 2"),
+        ({"n": 2, "m": 1, "a": [1.0, 2.0]}, r"Block\.a has shape \(1, 2\), but the value given has shape \(2,\)"),
+        ({"n": 2, "m": 1, "mode": 0.5}, r"Block\.mode holds whole numbers, but its start value is 0\.5: round it"),
+        ({"n": 2.5, "m": 1}, r"Block: the length n = 2\.5 .* whole number"),
+        ({"n": -1, "m": 1}, r"Block: the length n = -1 .* whole number"),
+        ({"n": math.nan, "m": 1}, r"Block: the length n = nan .* whole number"),
+        ({"n": "two", "m": 1}, r"Block: the length n = 'two' .* whole number"),
+    ],
+)
+def test_lengths_and_shapes_of_an_instance(values, sentence):
+    with pytest.raises(hm.DeclarationError, match=sentence):
+        Block(**values)
+
+
+def test_a_whole_number_of_any_type_is_a_length():
+    for two in (2, 2.0, np.int64(2), np.array(2)):
+        assert Block(n=two, m=1).variables[0].shape == (2,)
+
+
+# Classes.
+
+
+@pytest.mark.parametrize(
+    "name", ["t", "name", "variables", "jumps", "clocks", "priority", "flow_map", "outputs", "jump_set", "jump_map"]
+)
+@pytest.mark.parametrize("declaration", [hm.State(), hm.Parameter(1.0), hm.Dimension()])
+def test_names_of_the_framework_are_refused(name, declaration):
+    wrong = type("Wrong", (hm.HybridAutomaton,), {name: declaration})
+    with pytest.raises(hm.DeclarationError, match=rf"Wrong declares '{name}', a name of the framework: choose another"):
+        wrong()
+
+
+def test_a_clock_may_not_take_a_name_of_the_framework_either():
+    wrong = type("Wrong", (BouncingBall,), {"t": hm.Clock("jump")})
+    with pytest.raises(hm.DeclarationError, match="'t', a name of the framework"):
+        wrong()
+
+
+def test_a_shape_must_name_a_dimension():
+    class Wrong(hm.HybridAutomaton):
+        count = hm.Dimension()
+        x = hm.Input(0.0, shape="cuont")
+
+    with pytest.raises(hm.DeclarationError, match=r"Wrong\.x has the shape .*'cuont'.*count"):
+        Wrong(count=2)
+
+
+@pytest.mark.parametrize("written", ["jump_set", "jump_map"])
+def test_jump_set_and_jump_map_go_together(written):
+    wrong = type("Wrong", (hm.HybridAutomaton,), {written: lambda self, s: 0.0})
+    with pytest.raises(hm.DeclarationError, match="Wrong has one of jump_set and jump_map: write both, or neither"):
+        wrong()
+
+
+def test_two_transitions_of_one_name():
+    class Wrong(BouncingBall):
+        transitions = (hm.Jump("jump", lambda self, s: -1.0, lambda self, s: {}),)
+
+    with pytest.raises(hm.DeclarationError, match=r"Wrong has two transitions of one name among \['jump', 'jump'\]"):
+        Wrong()
+
+
+def test_a_clock_of_an_unknown_jump():
+    class Wrong(BouncingBall):
+        bell = hm.Clock("impact")
+
+    with pytest.raises(
+        hm.DeclarationError, match=r"Wrong\.bell ticks with jump 'impact', but the jumps are \['jump'\]"
+    ):
+        Wrong()
+
+
+# Maps.
+
+
+def ball_with(**maps):
+    return type("Wrong", (BouncingBall,), maps)()
+
+
+@pytest.mark.parametrize(
+    ("maps", "sentence"),
+    [
+        ({"flow_map": lambda self, s: {"h": s.v}}, r"flow_map of Wrong must also give \['v'\]"),
+        (
+            {"flow_map": lambda self, s: {"h": s.v, "v": -s.g, "w": 0.0}},
+            r"flow_map of Wrong sets \['w'\], but may set only \['h', 'v'\]",
+        ),
+        ({"flow_map": lambda self, s: {"h": s.v, "v": -s.g, "g": 0.0}}, r"flow_map of Wrong sets \['g'\]"),
+        ({"flow_map": lambda self, s: None}, r"flow_map of Wrong returned None: return a dictionary, name -> value"),
+        ({"flow_map": lambda self, s: [s.v, -s.g]}, r"flow_map of Wrong returned \["),
+        ({"flow_map": lambda self, s: {"h": s.vv, "v": -s.g}}, r"Wrong has no variable 'vv'; it has t, h, v, g, e\."),
+        (
+            {"flow_map": lambda self, s: {"h": [s.v, 1.0], "v": -s.g}},
+            r"Wrong: the value computed for h is .*, but h has shape \(\): return a number for a scalar",
+        ),
+        ({"jump_set": lambda self, s: s.h <= 0.0}, r"the jump set of 'jump' of Wrong is a boolean: return a margin"),
+        ({"jump_set": lambda self, s: True}, r"the jump set of 'jump' of Wrong is a boolean"),
+        ({"jump_set": lambda self, s: np.bool_(True)}, r"is a boolean"),
+        ({"jump_set": lambda self, s: None}, r"the jump set of 'jump' of Wrong is None: return a margin"),
+        ({"jump_set": lambda self, s: np.array([s.h, s.v])}, r"the jump set of 'jump' of Wrong .*shape \(2,\).*scalar"),
+        ({"flow_set": lambda self, s: s.h >= 0.0}, r"flow_set of Wrong is a boolean: .* least for 'and'"),
+        ({"flow_set": lambda self, s: None}, r"flow_set of Wrong is None"),
+        ({"flow_set": lambda self, s: np.array([s.h])}, r"flow_set of Wrong .*shape \(1,\)"),
+        (
+            {"jump_set": lambda self, s: 0.0, "jump_map": lambda self, s: None},
+            r"jump map of 'jump' of Wrong returned None",
+        ),
+        (
+            {"jump_set": lambda self, s: 0.0, "jump_map": lambda self, s: {"g": 1.0}},
+            r"the jump map of 'jump' of Wrong sets \['g'\], but may set only \['h', 'v'\]",
+        ),
+    ],
+)
+def test_maps_that_return_something_else(maps, sentence):
+    with pytest.raises(hm.DeclarationError, match=sentence):
+        run(ball_with(**maps))
+
+
+def test_outputs_must_all_be_given():
+    class Silent(Block):
+        def outputs(self, s):
+            return {}
+
+    with pytest.raises(hm.DeclarationError, match=r"outputs of Silent must also give \['y'\]"):
+        run(Silent(n=1, m=1)).at("y", 0.0)
+
+
+def test_computed_start_values_must_all_be_given_and_no_others():
+    class Computed(BouncingBall):
+        apex = hm.DiscreteState(computed=True)
+
+    with pytest.raises(hm.DeclarationError, match=r"start_map of Computed must also give \['apex'\]"):
+        run(Computed())
+    wrong = type("Computed", (Computed,), {"start_map": lambda self, s: {"apex": s.h, "h": 3.0}})
+    with pytest.raises(hm.DeclarationError, match=r"start_map of Computed sets \['h'\]"):
+        run(wrong())
+
+
+def test_computed_start_values_see_parameters_and_inputs():
+    class Computed(hm.HybridAutomaton):
+        u = hm.Input(2.0)
+        k = hm.Parameter(3.0)
+        x = hm.State(computed=True)
+
+        def start_map(self, s):
+            return {"x": s.u * s.k + s.t}
+
+        def flow_map(self, s):
+            return {"x": 0.0}
+
+    assert hm.simulate(Computed(), 6.0, t_start=5.0, inputs={"u": 4.0}).end.x == 17.0
+
+
+def test_a_value_asked_for_by_a_wrong_name_says_which_there_are():
+    values = run(BouncingBall()).end
+    with pytest.raises(hm.DeclarationError, match=r"BouncingBall has no variable 'height'; it has t, h, v, g, e\."):
+        _ = values.height
+    with pytest.raises(hm.DeclarationError, match="'height'"):
+        values["height"]
+    assert not hasattr(values, "height")
+    assert values.h == values["h"]
+
+
+def test_errors_are_of_one_family():
+    for kind in (hm.DeclarationError, hm.WiringError, hm.AlgebraicLoopError, hm.SimulationError):
+        assert issubclass(kind, hm.HybridModelError)

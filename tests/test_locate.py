@@ -1,0 +1,174 @@
+"""Location of rises: half-open interval, close pairs of crossings, accuracy, and the documented bound."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import hybrid_model as hm
+from hybrid_model.locate import first_nonnegative, rise_in_samples, scan_times, ulp
+
+SCAN = 8
+
+
+def first_rise(margin, a, b, scan=SCAN):
+    """Locate the first rise of a function on (a, b] as a run does for one step."""
+    times = scan_times(a, b, scan)
+    bracket = rise_in_samples(times, np.array([margin(t) for t in times]), margin)
+    return None if bracket is None else first_nonnegative(margin, *bracket)
+
+
+def test_ulp_is_the_distance_of_floats_and_not_smaller_than_at_one():
+    assert ulp(0.0) == ulp(1.0) == np.spacing(1.0)
+    assert ulp(-1e6) == ulp(1e6) == np.spacing(1e6)
+
+
+def test_scan_times_hold_the_ends_and_increase():
+    for a, b in ((0.0, 1.0), (1.0, 1.0 + 4e-16), (-1e6, -1e6 + 1e-9)):
+        times = scan_times(a, b, SCAN)
+        assert (times[0], times[-1]) == (a, b)
+        assert np.all(np.diff(times) > 0)
+
+
+def test_zero_at_the_end_is_found_at_the_end():
+    assert first_rise(lambda t: t - 1.0, 0.0, 1.0) == 1.0
+
+
+def test_zero_at_the_start_is_no_crossing():
+    assert first_rise(lambda t: t, 0.0, 1.0) is None
+    assert first_rise(lambda t: -t, 0.0, 1.0) is None
+
+
+def test_falling_margin_is_no_crossing():
+    assert first_rise(lambda t: 0.5 - t, 0.0, 1.0) is None
+
+
+def test_the_rise_after_a_fall_is_found():
+    assert first_rise(lambda t: (t - 0.4) * (t - 0.6), 0.0, 1.0) == pytest.approx(0.6, abs=1e-15)
+
+
+def test_even_crossings_of_one_step_are_found_at_the_first():
+    assert first_rise(lambda t: -(t - 0.4) * (t - 0.6), 0.0, 1.0) == pytest.approx(0.4, abs=1e-15)
+
+
+@pytest.mark.parametrize("centre", [0.02, 0.05, 1 / 9, 1.5 / 9, 0.5, 7.5 / 9, 0.95, 0.98])
+@pytest.mark.parametrize("half", [1e-2, 1e-4, 1e-6])
+def test_two_crossings_close_together_are_found_wherever_in_the_step(centre, half):
+    # 0.5 and 1.5/9 lie in the middle of two samples, 0.02 and 0.98 before the second and after the last but one.
+    found = first_rise(lambda t: half**2 - (t - centre) ** 2, 0.0, 1.0)
+    # The margin's rounding, 1e-16, over its slope at the crossing, 2 half; a few ulp of t.
+    assert found == pytest.approx(centre - half, abs=1e-15 + 1e-16 / half)
+
+
+@pytest.mark.parametrize("function", [np.cos, lambda t: 1.0 - t**2 / 2 + t**3 / 7, lambda t: np.exp(-3.0 * t**2)])
+@pytest.mark.parametrize("centre", [0.03, 0.21, 0.5, 0.77, 0.97])
+def test_maxima_of_other_forms_than_parabolas_are_found(function, centre):
+    top = function(0.0)
+    found = first_rise(lambda t: function(t - centre) - top + 1e-8, 0.0, 1.0)
+    assert found is not None
+    assert found == pytest.approx(centre, abs=2e-4)
+
+
+def test_a_margin_that_only_touches_zero_is_found_if_it_reaches_zero_in_floating_point():
+    assert first_rise(lambda t: -abs(t - 0.5), 0.0, 1.0, scan=7) == 0.5  # 0.5 is a sample
+    assert first_rise(lambda t: 1e-12 - (t - 0.53) ** 2, 0.0, 1.0) == pytest.approx(0.53, abs=2e-6)
+    assert first_rise(lambda t: -1e-12 - (t - 0.53) ** 2, 0.0, 1.0) is None
+
+
+def test_the_documented_bound_more_samples_find_what_fewer_miss():
+    def margin(t):
+        return math.exp(-(((t - 0.3) / 0.003) ** 2)) - 0.5
+
+    assert first_rise(margin, 0.0, 1.0) is None
+    # Half height of the peak at 0.003 sqrt(ln 2) from its centre.
+    assert first_rise(margin, 0.0, 1.0, scan=200) == pytest.approx(0.3 - 0.003 * math.sqrt(math.log(2.0)), abs=1e-14)
+
+
+def test_the_located_time_is_on_the_side_where_the_margin_is_zero_or_above():
+    for zero in np.linspace(0.01, 0.99, 50):
+        margin = lambda t, zero=zero: t**3 - zero**3  # noqa: E731
+        t = first_nonnegative(margin, 0.0, 1.0)
+        assert margin(t) >= 0.0
+        assert margin(t - 8 * ulp(t)) < 0.0
+
+
+def test_a_discontinuous_margin_is_located_at_its_first_float():
+    assert first_nonnegative(lambda t: 1.0 if t >= 0.7 else -1.0, 0.0, 1.0) == pytest.approx(0.7, abs=2 * ulp(1.0))
+
+
+def test_a_margin_that_stays_zero_is_located_where_it_becomes_zero():
+    assert first_rise(lambda t: min(t - 0.5, 0.0), 0.0, 1.0) == pytest.approx(0.5, abs=4 * ulp(1.0))
+
+
+def test_a_falling_zero_at_a_sample_does_not_hide_the_rise_before_it():
+    assert first_rise(lambda t: -(t - 0.6) * (t - 2 / 3), 0.0, 1.0) == pytest.approx(0.6, abs=1e-14)
+
+
+@pytest.mark.parametrize("below", [-math.inf, -1e300])
+def test_an_infinite_margin_is_located_like_any_other(below):
+    # np.where(z > 0, x, -inf) is a natural way to disable a guard.
+    margin = lambda t: t - 0.5 if t >= 0.5 else below  # noqa: E731
+    assert first_rise(margin, 0.0, 1.0) == pytest.approx(0.5, abs=4 * ulp(1.0))
+
+
+def test_a_margin_of_minus_infinity_throughout_never_fires():
+    assert first_rise(lambda t: -math.inf, 0.0, 1.0) is None
+
+
+@settings(max_examples=200, deadline=None)
+@given(a=st.floats(-1e3, 1e3), length=st.floats(1e-6, 1e3), where=st.floats(0.0, 1.0), slope=st.floats(1e-3, 1e3))
+def test_roots_of_affine_margins(a, length, where, slope):
+    b = a + length
+    root = a + where * length
+    assume(a < root <= b)
+    found = first_rise(lambda t: slope * (t - root), a, b)
+    # t - root is exact near the root, so only brentq's tolerance is left.
+    assert found == pytest.approx(root, abs=6 * ulp(max(abs(a), abs(b))))
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.lists(st.integers(1, 59), min_size=1, max_size=4, unique=True))
+def test_first_rise_of_polynomials_with_known_roots(sixtieths):
+    """Roots at least 1/60 apart in one step; the scan has 1/9, so close pairs happen often."""
+    roots = sorted(k / 60 for k in sixtieths)
+
+    def margin(t):
+        # Negative at the start, as every margin is where a flow starts: the first root is the first rise.
+        return -((-1.0) ** len(roots)) * math.prod(t - root for root in roots)
+
+    found = first_rise(margin, 0.0, 1.0)
+    if not _crowded(roots):
+        assert found == pytest.approx(roots[0], abs=1e-12)
+
+
+def _crowded(roots):
+    # Three roots in less than two sample distances: a margin may come up and go down between samples unseen.
+    return any(c - a < 2 / 9 for a, c in zip(roots, roots[2:], strict=False))
+
+
+@pytest.mark.parametrize("power", [4, 6, 8, 10])
+def test_located_times_converge_with_the_solver_tolerance(power):
+    """x'' = -x from (0, 1): x = sin t rises through 1/2 at pi/6; the error follows the tolerance of the flow."""
+
+    class Oscillator(hm.HybridAutomaton):
+        x = hm.State(0.0)
+        v = hm.State(1.0)
+        done = hm.DiscreteState(0)
+
+        def flow_map(self, s):
+            return {"x": s.v, "v": -s.x}
+
+        def jump_set(self, s):
+            return hm.least(s.x - 0.5, 0.5 - s.done)
+
+        def jump_map(self, s):
+            return {"done": 1}
+
+    tolerance = 10.0**-power
+    arc = hm.simulate(
+        Oscillator(), 1.0, solver=hm.Solver(method=hm.Method.RK45, rtol=max(tolerance, 1e-12), atol=tolerance)
+    )
+    # One step's tolerance times the handful of steps to pi/6, over the slope cos(pi/6); 100 is generous for both.
+    assert arc.jumps[0].t == pytest.approx(math.pi / 6, abs=100 * tolerance)

@@ -1,0 +1,107 @@
+"""Inputs of runs: constants, functions of time, signals with breakpoints."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid_model as hm
+from hybrid_model.layout import Layout
+from hybrid_model.signals import Inputs
+
+
+class Plant(hm.HybridAutomaton):
+    u = hm.Input(2.0)
+    w = hm.Input([1.0, -1.0])
+    x = hm.State(0.0)
+
+    def flow_map(self, s):
+        return {"x": s.u + s.w[0] + s.w[1]}
+
+
+def inputs(**given):
+    return Inputs(Layout(Plant()), given)
+
+
+def test_inputs_not_given_keep_their_start_values():
+    np.testing.assert_array_equal(inputs().at(0.0), [2.0, 1.0, -1.0])
+    assert not inputs().vary
+
+
+@pytest.mark.parametrize(
+    ("w", "expected"),
+    [
+        ([3.0, 4.0], [3.0, 4.0]),
+        (5.0, [5.0, 5.0]),
+        (lambda t: [t, 2.0 * t], [0.5, 1.0]),
+        (lambda t: t, [0.5, 0.5]),
+        (hm.Signal(lambda t: np.array([1.0, 2.0])), [1.0, 2.0]),
+    ],
+)
+def test_values_are_given_as_number_array_function_or_signal(w, expected):
+    np.testing.assert_array_equal(inputs(w=w).at(0.5), [2.0, *expected])
+
+
+def test_breakpoints_of_all_signals_come_in_order():
+    given = inputs(u=hm.Signal(lambda t: 0.0, [3.0, 1.0]), w=hm.Signal(lambda t: 0.0, (2.0,)))
+    assert [given.next_breakpoint(t) for t in (-1.0, 1.0, 2.5, 3.0)] == [1.0, 2.0, 3.0, math.inf]
+
+
+def test_a_held_value_reports_whether_it_changed():
+    given = inputs()
+    assert given.hold("u", 3.0)
+    assert not given.hold("u", 3.0)
+    assert given.hold_element(2, 7.0)
+    assert not given.hold_element(2, 7.0)
+    np.testing.assert_array_equal(given.at(0.0), [3.0, 1.0, 7.0])
+
+
+def test_a_copy_is_independent():
+    one = inputs(u=lambda t: t)
+    two = one.copy()
+    two.hold("w", 9.0)
+    np.testing.assert_array_equal(one.at(4.0), [4.0, 1.0, -1.0])
+    np.testing.assert_array_equal(two.at(4.0), [4.0, 9.0, 9.0])
+
+
+def test_the_array_returned_earlier_does_not_change():
+    given = inputs()
+    before = given.at(0.0).copy()
+    held = given.at(0.0)
+    given.hold_element(0, 8.0)
+    np.testing.assert_array_equal(held, before)
+    given = inputs()
+    held = given.at(0.0)
+    given.hold("u", 8.0)
+    np.testing.assert_array_equal(held, before)
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "sentence"),
+    [
+        ({"v": 1.0}, hm.DeclarationError, r"Plant \(inputs\) has no variable 'v'; it has u, w\."),
+        ({"x": 1.0}, hm.DeclarationError, r"no variable 'x'"),
+        ({"u": [1.0, 2.0]}, hm.DeclarationError, r"input u has shape \(\), but the value given has shape \(2,\)"),
+        ({"w": [1.0, 2.0, 3.0]}, hm.DeclarationError, r"input w has shape \(2,\)"),
+        ({"u": "fast"}, hm.DeclarationError, r"Plant\.u = 'fast' is not a number"),
+        ({"w": lambda t: [1.0, 2.0, 3.0]}, hm.SimulationError, r"input w has shape \(2,\), but .* gives shape \(3,\)"),
+        ({"u": lambda t: [1.0]}, hm.SimulationError, r"input u has shape \(\), but .* shape \(1,\)"),
+        ({"u": lambda t: "fast"}, hm.SimulationError, r"input u is 'fast' at t = 0 s"),
+        ({"u": lambda t: None}, hm.SimulationError, r"input u is "),
+    ],
+)
+def test_inputs_that_do_not_fit(given, error, sentence):
+    with pytest.raises(error, match=sentence):
+        hm.simulate(Plant(), 1.0, inputs=given)
+
+
+def test_an_unknown_name_cannot_be_held():
+    with pytest.raises(hm.DeclarationError, match="no variable 'v'"):
+        inputs().hold("v", 1.0)
+
+
+def test_a_run_follows_its_inputs():
+    arc = hm.simulate(Plant(), 2.0, inputs={"u": math.sin, "w": hm.Signal(lambda t: [t >= 1.0, 0.0], [1.0])})
+    assert arc.end.x == pytest.approx(1.0 - math.cos(2.0) + 1.0, abs=1e-12)
+    assert arc.at("u", 0.25) == math.sin(0.25)
+    np.testing.assert_array_equal(arc.at("w", [0.5, 1.0]), [[0.0, 0.0], [1.0, 0.0]])
