@@ -58,7 +58,8 @@ static FlowEnd flow(Engine *engine, const Point *point, double limit, bool locat
             return FLOW_REACHED;
         double piece_end = next_time(engine, point, locate, true);
         FlowEnd result = flow_piece(engine, point, limit, piece_end, locate, budget);
-        if (result != FLOW_REACHED)
+        /* At an event the loop begins anew: a breakpoint of the same instant may come before it. */
+        if (result != FLOW_REACHED && result != FLOW_EVENT)
             return result;
     }
 }
@@ -96,14 +97,24 @@ bool engine_next_time_event(Engine *engine, double *event_time)
     return isfinite(*event_time);
 }
 
+/* Whether a breakpoint is due at the live point or comes up to `target`; the times must be there. */
+static bool breakpoint_until(const Engine *engine, double target)
+{
+    const Model *m = engine->model;
+    for (size_t j = 0; j < m->n_jumps; j++)
+        if (m->jumps[j].kind == JUMP_ON_TIME && m->jumps[j].internal && engine->times[m->jumps[j].index] <= target)
+            return true;
+    return false;
+}
+
 /* The target lies a rounding or less than the tolerance behind the event: go there if the event is
-   still due then; otherwise the point stays at the event. */
+   still due then and no breakpoint lies between; otherwise the point stays at the event. */
 static void flow_past_event(Engine *engine, double target)
 {
     size_t before, after, budget = LOOK_AHEAD_STEPS;
     copy_point(engine, &engine->live, &engine->shown);
     engine->view = VIEW_NONE;
-    if (first_enabled(engine, &engine->live, &before) &&
+    if (first_enabled(engine, &engine->live, &before) && !breakpoint_until(engine, target) &&
         flow(engine, &engine->shown, target, false, &budget) == FLOW_REACHED &&
         first_enabled(engine, &engine->shown, &after) && before == after)
         copy_point(engine, &engine->shown, &engine->live);

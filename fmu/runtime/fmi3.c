@@ -245,6 +245,16 @@ fmi3Status fmi3ExitInitializationMode(fmi3Instance handle)
 
 /* ---- saved states ---- */
 
+static bool is_own(const Instance *instance, const SavedState *saved)
+{
+    return saved->model == &model && saved->size == engine_block_size(instance->engine);
+}
+
+static fmi3Status foreign_state(const Instance *instance, const char *function)
+{
+    return refuse(instance, "%s: %s: this is not a state of this FMU.", instance->name, function);
+}
+
 fmi3Status fmi3GetFMUState(fmi3Instance handle, fmi3FMUState *FMUState)
 {
     Instance *instance = enter(handle, "fmi3GetFMUState", MODE_ANY);
@@ -254,6 +264,8 @@ fmi3Status fmi3GetFMUState(fmi3Instance handle, fmi3FMUState *FMUState)
         return null_argument(instance, "fmi3GetFMUState");
     size_t size = engine_block_size(instance->engine);
     SavedState *saved = *FMUState;
+    if (saved && !is_own(instance, saved))
+        return foreign_state(instance, "fmi3GetFMUState");
     if (!saved) {
         saved = malloc(sizeof *saved + size);
         if (!saved)
@@ -274,8 +286,8 @@ fmi3Status fmi3SetFMUState(fmi3Instance handle, fmi3FMUState FMUState)
         return fmi3Error;
     if (!saved)
         return null_argument(instance, "fmi3SetFMUState");
-    if (saved->model != &model || saved->size != engine_block_size(instance->engine))
-        return refuse(instance, "%s: fmi3SetFMUState: this is not a state of this FMU.", instance->name);
+    if (!is_own(instance, saved))
+        return foreign_state(instance, "fmi3SetFMUState");
     engine_restore(instance->engine, saved->block);
     return fmi3OK;
 }

@@ -74,22 +74,35 @@ static bool stuck_in_time(Engine *engine, size_t jump, double t)
                    engine->model->jumps[jump].name, TIME_EVENT_REPEATS, t);
 }
 
-/* Takes the breakpoints of the flow that are due. */
-bool take_internal_jumps(Engine *engine, const Point *point)
+/* The first breakpoint of the flow that is due, n_jumps if there is none. */
+static size_t first_internal(const Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
+    size_t j = 0;
+    while (j < m->n_jumps && !(m->jumps[j].kind == JUMP_ON_TIME && m->jumps[j].internal &&
+                               engine->times[m->jumps[j].index] <= *point->time))
+        j++;
+    return j;
+}
+
+/* Takes the breakpoints that are due, up to the first visible jump in the order of the table: a jump
+   of the same instant that comes before a breakpoint sees the state before it. */
+bool take_internal_jumps(Engine *engine, const Point *point)
+{
+    size_t n = engine->model->n_jumps, visible;
     for (size_t repeats = 0;; repeats++) {
         if (!evaluate_times(engine, point))
             return false;
-        size_t j = 0;
-        while (j < m->n_jumps && !(m->jumps[j].kind == JUMP_ON_TIME && m->jumps[j].internal &&
-                                   engine->times[m->jumps[j].index] <= *point->time))
-            j++;
-        if (j == m->n_jumps)
+        size_t internal = first_internal(engine, point);
+        if (internal == n)
+            return true;
+        if (!first_enabled(engine, point, &visible))
+            return false;
+        if (visible < internal)
             return true;
         if (repeats == TIME_EVENT_REPEATS)
-            return stuck_in_time(engine, j, *point->time);
-        if (!apply_reset(engine, j, point))
+            return stuck_in_time(engine, internal, *point->time);
+        if (!apply_reset(engine, internal, point))
             return false;
     }
 }
@@ -208,7 +221,7 @@ bool engine_jump_all(Engine *engine)
 {
     while (engine->status->ending == ENDED_NOT) {
         size_t jump;
-        if (!first_enabled(engine, &engine->live, &jump))
+        if (!take_internal_jumps(engine, &engine->live) || !first_enabled(engine, &engine->live, &jump))
             return end_run(engine);
         if (jump == engine->model->n_jumps)
             return true;

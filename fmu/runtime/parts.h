@@ -14,10 +14,10 @@
 /* Guards that cross within this time (s) are simultaneous.  A state outside the flow set by less
    than this (in units of the margin), or that is back inside within this time, counts as inside. */
 #define EVENT_TOLERANCE 1e-9
-/* Width (s) to which a crossing is located, never less than 4 ulp of the time. */
-#define LOCATION_TOLERANCE 1e-14
-#define RELATIVE_TOLERANCE 1e-12
-#define ABSOLUTE_TOLERANCE 1e-14
+/* Width (s) to which a crossing is located, never less than an ulp of the time. */
+#define LOCATION_TOLERANCE 1e-16
+#define RELATIVE_TOLERANCE 1e-13
+#define ABSOLUTE_TOLERANCE 1e-15
 #define LOOK_AHEAD_STEPS 20000
 #define LOOK_AHEAD_TIME 1e6
 #define ADVANCE_STEPS 1000000
@@ -125,7 +125,7 @@ void changed(Engine *engine);
 bool accept_state(Engine *engine, const char *source, const Point *point);
 bool apply_reset(Engine *engine, size_t jump, const Point *point);
 bool evaluate_times(Engine *engine, const Point *point);
-/* Takes the breakpoints of the flow that are due. */
+/* Takes the breakpoints of the flow that are due and come before any visible jump. */
 bool take_internal_jumps(Engine *engine, const Point *point);
 /* The first enabled visible jump at the point, n_jumps if there is none. */
 bool first_enabled(Engine *engine, const Point *point, size_t *jump);

@@ -69,7 +69,7 @@ static bool show(Engine *engine, View view)
         return accept_state(engine, "its start value", shown);
     }
     if (view == VIEW_PENDING && engine->status->ending == ENDED_NOT) {
-        if (!first_enabled(engine, shown, &jump))
+        if (!take_internal_jumps(engine, shown) || !first_enabled(engine, shown, &jump))
             return false;
         if (jump < engine->model->n_jumps)
             return apply_reset(engine, jump, shown) && take_internal_jumps(engine, shown);

@@ -1,0 +1,50 @@
+"""The C compiler of the package ziglang, the fallback where there is no other: no warning, and the same runs."""
+
+import re
+import subprocess
+import sys
+import zipfile
+
+import numpy as np
+import pytest
+from fmu_driver import Instance, Library, advance
+from witnesses import Mix
+
+from fmu.export import export_fmu
+
+pytestmark = pytest.mark.long
+
+
+@pytest.fixture
+def by_zig(tmp_path, monkeypatch):
+    pytest.importorskip("ziglang", reason="the package ziglang is not installed")
+    monkeypatch.setenv("CC", f"{sys.executable} -m ziglang cc")
+    return export_fmu(Mix(), tmp_path / "mix.fmu")
+
+
+def test_its_fmu_runs_as_the_usual_one(by_zig, exported):
+    """Warnings are errors for it too; its libm may differ in the last bit."""
+    records = []
+    for path in (exported(Mix(), "mix"), by_zig):
+        for events in (True, False):
+            instance = Instance(Library(path), events=events, early=events)
+            instance.initialize(0.0, 3.0)
+            records.append(advance(instance, [0.25 * k for k in range(13)]))
+            instance.free()
+    for usual, other in zip(records[:2], records[2:], strict=True):
+        assert [clocks for _, clocks in other.ticks] == [clocks for _, clocks in usual.ticks]
+        np.testing.assert_allclose([t for t, _ in other.ticks], [t for t, _ in usual.ticks], rtol=0, atol=1e-10)
+        np.testing.assert_allclose(
+            [values for _, values in other.samples], [values for _, values in usual.samples], rtol=0, atol=1e-10
+        )
+    assert len(records[0].ticks) > 10
+
+
+def test_its_fmu_exports_fmi_functions_only(by_zig, tmp_path):
+    with zipfile.ZipFile(by_zig) as archive:
+        [member] = [name for name in archive.namelist() if name.startswith("binaries/")]
+        binary = archive.extract(member, tmp_path)
+    symbols = subprocess.run(["nm", "-D", "--defined-only", binary], capture_output=True, text=True, check=True).stdout
+    names = re.findall(r" [A-Z] (\S+)$", symbols, flags=re.MULTILINE)
+    assert names
+    assert [name for name in names if not name.startswith("fmi3")] == []
