@@ -46,8 +46,8 @@ class Solver:
     """
 
     method: Method = Method.DOP853
-    rtol: float = 1e-12
-    atol: float = 1e-14
+    rtol: float = 1e-13
+    atol: float = 1e-15
     max_step: float = math.inf
     scan_points: int = 8
     event_tolerance: float = 1e-9

@@ -127,7 +127,7 @@ static double look_at(Search *search, Path path, double t, size_t row)
 static void polish(Search *search, size_t row, Bracket *bracket)
 {
     double a = bracket->a, fa = bracket->value_a, b = bracket->b, fb = bracket->value_b, fraction = 0.5;
-    double width = fmax(LOCATION_TOLERANCE, 4.0 * time_ulp(b));
+    double width = fmax(LOCATION_TOLERANCE, 2.0 * time_ulp(b));
     for (int i = 0; i < 200 && b - a > width && fb != 0.0 && !search->failed; i++) {
         double t = a + fraction * (b - a);
         if (t <= a || t >= b)

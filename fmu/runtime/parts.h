@@ -14,10 +14,10 @@
 /* Guards that cross within this time (s) are simultaneous.  A state outside the flow set by less
    than this (in units of the margin), or that is back inside within this time, counts as inside. */
 #define EVENT_TOLERANCE 1e-9
-/* Width (s) to which a crossing is located, never less than 4 ulp of the time. */
-#define LOCATION_TOLERANCE 1e-14
-#define RELATIVE_TOLERANCE 1e-12
-#define ABSOLUTE_TOLERANCE 1e-14
+/* Width (s) to which a crossing is located, never less than 2 ulp of the time: the shortest probe is half of it. */
+#define LOCATION_TOLERANCE 1e-16
+#define RELATIVE_TOLERANCE 1e-13
+#define ABSOLUTE_TOLERANCE 1e-15
 #define LOOK_AHEAD_STEPS 20000
 #define LOOK_AHEAD_TIME 1e6
 #define ADVANCE_STEPS 1000000
