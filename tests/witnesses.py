@@ -227,3 +227,55 @@ class Mix(hm.HybridAutomaton):
             },
         ),
     )
+
+
+def random_automaton(seed):
+    """An automaton of random structure: up to three coupled states with guards, up to two timers, some hidden.
+
+    Each state rises through its limit at a rate of at least 0.2, so every crossing is a clear one.
+    """
+    rng = np.random.default_rng(seed)
+    n, m = int(rng.integers(0, 4)), int(rng.integers(1, 3))
+    limit, decay, keep = rng.uniform(0.6, 1.4, n), rng.uniform(0.0, 0.5, n), rng.uniform(-0.4, 0.3, n)
+    coupling, wave, speed = rng.uniform(-0.2, 0.2, (n, n)), rng.uniform(0.0, 0.3, n), rng.uniform(1.0, 9.0, n)
+    drive = 0.2 + decay * limit + np.abs(coupling).sum(axis=1) + wave + rng.uniform(0.2, 2.0, n)
+    period, hidden = rng.uniform(0.15, 0.6, m), rng.random(m) < 0.4
+    hidden[0] &= n > 0  # something must be seen
+    declared = {}
+    for i in range(n):
+        declared[f"x{i}"] = hm.State(float(rng.uniform(-0.3, 0.4)), output=True)
+        declared[f"count{i}"] = hm.DiscreteState(0, integer=True, output=True)
+        declared[f"ticks{i}"] = hm.Clock(f"guard{i}")
+    for k in range(m):
+        declared[f"rounds{k}"] = hm.DiscreteState(0, integer=True, output=True)
+        if not hidden[k]:
+            declared[f"strikes{k}"] = hm.Clock(f"timer{k}")
+
+    def flow_map(self, s):
+        strong = 1.0 + 0.5 * np.mod(s.rounds0, 2)
+        return {
+            f"x{i}": strong * drive[i]
+            - decay[i] * s[f"x{i}"]
+            + sum(coupling[i, j] * np.sin(s[f"x{j}"]) for j in range(n))
+            + wave[i] * np.sin(speed[i] * s.t)
+            for i in range(n)
+        }
+
+    def guard(i):
+        def jump_map(self, s):
+            new = {f"x{i}": keep[i] * s[f"x{i}"], f"count{i}": s[f"count{i}"] + 1}
+            return new if n < 2 else new | {f"x{(i + 1) % n}": 0.7 * s[f"x{(i + 1) % n}"]}
+
+        return hm.Jump(f"guard{i}", lambda self, s: s[f"x{i}"] - limit[i], jump_map)
+
+    def timer(k):
+        def jump_map(self, s):
+            new = {f"rounds{k}": s[f"rounds{k}"] + 1}
+            return new if hidden[k] or n == 0 else new | {"x0": s.x0 - 0.1}
+
+        return hm.TimeEvent(f"timer{k}", lambda self, s: period[k] * (s[f"rounds{k}"] + 1), jump_map, bool(hidden[k]))
+
+    transitions = [*map(guard, range(n)), *map(timer, range(m))]
+    rng.shuffle(transitions)
+    members = {**declared, "flow_map": flow_map, "transitions": tuple(transitions)}
+    return type(f"Random{seed}", (hm.HybridAutomaton,), members)()

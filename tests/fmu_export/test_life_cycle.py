@@ -14,7 +14,7 @@ import pytest
 from fmu_driver import ERROR, OK, Instance, Library, advance
 from witnesses import Ramps
 
-from hybrid_model.models import Thermostat
+from hybrid_model.models import BouncingBall, Thermostat
 
 TESTS = str(Path(__file__).parents[1])
 POINTS = [0.0, 0.2, 0.45, 0.7, 1.0]
@@ -188,6 +188,21 @@ def test_reset_makes_an_instance_like_new(mode, events, library):
         records.append(advance(instance, POINTS))
         instance.free()
     assert records[0] == records[1]
+
+
+@pytest.mark.parametrize("events", [True, False])
+def test_reset_after_an_accumulation_forgets_it(events, exported):
+    """The guard against accumulating jumps counts anew: the second run ends where and as the first did."""
+    instance = Instance(Library(exported(BouncingBall(), "bouncing_ball")), events=events, early=events)
+    ends = []
+    for _ in range(3):
+        instance.initialize()
+        record = advance(instance, [0.3 * k for k in range(12)])
+        assert record.terminated
+        ends.append((record, instance.values(), instance.messages[-1]))
+        instance.do("Reset")
+    assert ends[0] == ends[1] == ends[2]
+    instance.free()
 
 
 def test_two_instances_interleaved_equal_two_alone(library):

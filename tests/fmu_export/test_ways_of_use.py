@@ -12,7 +12,7 @@ import pytest
 from catalogue import cases
 from hypothesis import Phase, assume, given, settings
 from hypothesis import strategies as st
-from witnesses import Cascade, FlowFirst, Hill, Mix, Ramps, Timers
+from witnesses import Cascade, FlowFirst, Hill, Mix, Ramps, Timers, random_automaton
 
 import hybrid_model as hm
 from hybrid_model.models import BouncingBall, Thermostat
@@ -183,6 +183,21 @@ def test_random_automata_in_every_way(data, library):
         compare(automaton, arc, run(loaded, way, points, start=start, changes=change), loaded.outputs, way, change)
 
 
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(k, marks=pytest.mark.long) for k in range(4, 40))])
+def test_random_structures_in_every_way(seed, library):
+    automaton = random_automaton(seed)
+    loaded = library(automaton, automaton.name)
+    t_end = 2.0
+    arc = hm.simulate(automaton, t_end)
+    times = [jump.t for jump in arc.jumps if not automaton.jumps[jump.index].internal]
+    assert len(times) >= 2
+    if any(b - a < 1e-6 for a, b in itertools.pairwise([*times, t_end])):
+        pytest.skip("events of this automaton are almost simultaneous: either order is right")
+    for way in WAYS:
+        record = run(loaded, way, communication_points(way, 0.0, t_end, 11, seed=seed))
+        compare(automaton, arc, record, loaded.outputs, way)
+
+
 # Witnesses with known runs: each in every way.
 
 
@@ -342,6 +357,40 @@ def test_visible_time_events_are_announced_and_hidden_ones_are_not(library):
     _, update = instance.iterate()
     assert update.next_time == 1.0
     assert instance.get("mode") == instance.get("saw") == 2
+    instance.free()
+
+
+def test_an_input_set_between_steps_counts_from_then_on(library):
+    """Although an event has been announced: that announcement was made for another input."""
+    automaton, change = Mix(), (0.1, "push", 1.0)
+    loaded = library(automaton, "mix")
+    instance = fmu_driver.Instance(loaded)
+    instance.initialize(0.0, 1.0)
+    _, update = instance.iterate()
+    instance.do("EnterStepMode")
+    instance.step(0.0, 0.1)
+    instance.set("push", 1.0)
+    step = instance.step(0.1, 0.9)
+    arc = hm.simulate(automaton, 1.0, inputs=signals(automaton, {"push": [change[::2]]}))
+    first = next(jump for jump in arc.jumps if jump.name == "second")
+    assert step.early
+    assert step.time == pytest.approx(first.t, abs=1e-9)
+    assert step.time < update.next_time - 1e-3
+    instance.free()
+
+
+def test_an_input_that_enables_a_jump_between_steps_holds_up_the_next_one(library):
+    instance = fmu_driver.Instance(library(Timers(), "timers"))
+    instance.initialize(0.0, 1.0)
+    instance.iterate()
+    instance.do("EnterStepMode")
+    instance.step(0.0, 0.1)
+    instance.set("command", 2.0)
+    assert instance.step(0.1, 0.1) == fmu_driver.Step(fmu_driver.OK, True, False, True, 0.1)
+    instance.do("EnterEventMode")
+    found, update = instance.iterate()
+    assert found == [("obeys",)]
+    assert update.next_time == 0.25
     instance.free()
 
 
