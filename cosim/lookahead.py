@@ -46,7 +46,7 @@ class Lookahead:
         """Move `run` along the way to time `t` before its end, without integrating again."""
         for piece, z, j in self._way:
             if piece.t1 >= t:
-                run.t, run.x, run.z, run.j = t, piece.at(t), z, j
+                run.move(t, piece.at(t), z, j)
                 break
         self._way = [step for step in self._way if step[0].t1 > t]
         # A breakpoint exactly at t belongs to what comes after it.

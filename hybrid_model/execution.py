@@ -73,6 +73,9 @@ class Execution:
         Hybrid time.
     x, z, p : ndarray
         Continuous states, discrete states, parameters.
+    levels : ndarray
+        The margin from which on each jump on state is due: zero, or slightly below where the crossing is so near to the
+        end of a flow that it counts as reached (rule 6).
     stopped : Stop or None
         Set when the run cannot go on; `message` has the particulars.
     """
@@ -102,6 +105,7 @@ class Execution:
         self.message = ""
         self.next_step: float | None = None
         self._left_flow_set = False
+        self.levels = self._zero_levels()
         self.compute_start()
 
     def compute_start(self) -> None:
@@ -134,11 +138,11 @@ class Execution:
         if not self.automaton.jumps:
             return None
         s = self.values()
-        margins, times = iter(self.jump_margins(s)), iter(self.event_times(s))
+        margins, levels, times = iter(self.jump_margins(s)), iter(self.levels), iter(self.event_times(s))
         may_jump = self.automaton.priority is Priority.JUMP or self._left_flow_set or not self.in_flow_set(0.0)
         for index, info in enumerate(self.automaton.jumps):
             if info.trigger is Trigger.STATE:
-                if next(margins) >= 0.0 and may_jump:
+                if next(margins) >= next(levels) and may_jump:
                     return index
             elif next(times) <= self.t:
                 return index
@@ -164,6 +168,9 @@ class Execution:
         self.j += 1
         self._left_flow_set = False
         on_state = info.trigger is Trigger.STATE
+        if on_state:
+            self.levels = self.levels.copy()
+            self.levels[self._number_of_guard(index)] = 0.0
         if not on_state:
             self._require_progress(index, before)
         message = self.monitor.record(self.automaton.name, info.name, self.t, on_state=on_state)
@@ -237,6 +244,7 @@ class Execution:
         if not self.in_flow_set(self.solver.event_tolerance):
             self._block("the state is in neither the flow set nor the jump set")
             return []
+        self.levels = self._zero_levels()
         pieces, left = integrate(self, min(limit, self.next_time_event()))
         self._left_flow_set = left
         tolerance = self.solver.event_tolerance
@@ -244,6 +252,17 @@ class Execution:
         if left and self.due() is None and not self.flow_margin(self.values()) > -tolerance:
             self._block("the flow left the flow set, and the state is not in the jump set")
         return pieces
+
+    def move(self, t: float, x: FloatArray, z: FloatArray, j: int) -> None:
+        """Move to a point of a flow that a copy of this execution has already flown."""
+        self.t, self.x, self.z, self.j = t, x, z, j
+        self.levels = self._zero_levels()
+
+    def _zero_levels(self) -> FloatArray:
+        return np.zeros(sum(info.trigger is Trigger.STATE for info in self.automaton.jumps))
+
+    def _number_of_guard(self, index: int) -> int:
+        return sum(info.trigger is Trigger.STATE for info in self.automaton.jumps[:index])
 
     def drift(self, t: float) -> None:
         """Move on by no more than the event tolerance with the present derivative, although a jump is due.

@@ -70,7 +70,9 @@ def integrate(execution: Execution, end: float) -> tuple[list[FlowPiece], bool]:
     watch = _Watch(execution)
     if end - execution.t <= SHORTEST * ulp(end):
         x1 = execution.x + (end - execution.t) * _FlowMap(execution, end)(execution.t, execution.x)
-        return [_move(execution, _straight(execution.t, end, execution.x, x1))], False
+        pieces.append(_move(execution, _straight(execution.t, end, execution.x, x1)))
+        watch.raise_levels(pieces[-1])
+        return pieces, False
     for piece in _steps(execution, end):
         found = watch.first_event(piece, end)
         if found is None:
@@ -79,7 +81,11 @@ def integrate(execution: Execution, end: float) -> tuple[list[FlowPiece], bool]:
         t, left = found
         x = piece.at(t) if t <= piece.t1 else piece.interpolate(t)
         pieces.append(_move(execution, FlowPiece(piece.t0, t, piece.x0, x, piece.interpolate)))
+        if t + execution.solver.event_tolerance > end:
+            watch.raise_levels(pieces[-1])
         return pieces, left
+    if pieces:
+        watch.raise_levels(pieces[-1])
     return pieces, False
 
 
@@ -224,6 +230,20 @@ class _Watch:
             return None
         t, row = min(found)
         return self._latest_of_simultaneous(piece, t, end), row >= self._guards
+
+    def raise_levels(self, piece: FlowPiece) -> None:
+        """Enable the guards that would cross within the tolerance if the flow did not end with this piece (rule 6).
+
+        A flow that ends at a time event may not go on to see whether a guard reaches zero a rounding later. Such a
+        guard counts as crossed: it is due as long as no jump lowers its margin.
+        """
+        execution = self._execution
+        if self._guards == 0 or len(self._watched) == 0 or self._watched[0] >= self._guards:
+            return
+        now = self._margins(piece.t1, piece.x1)[: self._guards]
+        soon = piece.t1 + self._tolerance
+        then = self._margins(soon, piece.interpolate(soon))[: self._guards]
+        execution.levels = np.where((now < 0.0) & (then >= 0.0), now, 0.0)
 
     def _along(self, piece: FlowPiece, row: int) -> Callable[[float], float]:
         def margin(t: float) -> float:

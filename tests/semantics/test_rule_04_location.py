@@ -48,8 +48,10 @@ def test_first_impact_by_every_method(method):
 
 def test_the_located_state_is_in_the_jump_set():
     arc = hm.simulate(Ramp(rate=0.3, threshold=0.1), 3.0)
-    assert len(arc.jumps) == 8 or len(arc.jumps) == 9
-    for jump in arc.jumps:
+    # The ninth crossing is at the end time up to rounding: it counts (rule 6), and alone may lie a rounding below.
+    assert len(arc.jumps) == 9
+    assert abs(arc.jumps[-1].x_before[0] - arc.jumps[-1].z_before[0]) >= 0.1 - 0.3 * arc.event_tolerance
+    for jump in arc.jumps[:-1]:
         assert abs(jump.x_before[0] - jump.z_before[0]) >= 0.1
 
 

@@ -1,0 +1,108 @@
+"""Rule 6: a crossing that rounding puts just behind a time event or the end time counts as reached there."""
+
+import numpy as np
+import pytest
+
+import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_event_exact
+from cosim.system import System
+
+
+class Staircase(hm.HybridAutomaton):
+    """Rises at a rate and broadcasts every `height`; a timer, with period `period`, stops and starts the rise."""
+
+    x = hm.State(0.0, output=True)
+    sent = hm.DiscreteState(0.0, output=True)
+    k = hm.DiscreteState(0, integer=True)
+    rate = hm.Parameter(0.1)
+    height = hm.Parameter(0.3)
+    period = hm.Parameter(3.0)
+    send = hm.Clock("send")
+
+    def flow_map(self, s):
+        return {"x": s.rate * (1.0 - np.mod(s.k, 2))}
+
+    def risen(self, s):
+        return s.x - s.sent - s.height
+
+    def hold(self, s):
+        return {"sent": s.x}
+
+    def next_switch(self, s):
+        return (s.k + 1) * s.period
+
+    def switch(self, s):
+        return {"k": s.k + 1}
+
+    transitions = (
+        hm.TimeEvent("switch", next_switch, switch, internal=True),
+        hm.Jump("send", risen, hold),
+    )
+
+
+def simulated(automaton, t_end, exported):
+    return hm.simulate(automaton, t_end).event_times("send")
+
+
+def in_process(automaton, t_end, exported):
+    return run_event_exact(System([AutomatonSlave("a", automaton)], {}), t_end).tick_times("a", "send")
+
+
+def as_fmu(automaton, t_end, exported):
+    slave = FmuSlave("a", exported(automaton, f"staircase{automaton.name}"))
+    return run_event_exact(System([slave], {}), t_end).tick_times("a", "send")
+
+
+RUNS = pytest.mark.parametrize("run", [simulated, in_process, as_fmu])
+
+
+@RUNS
+@pytest.mark.parametrize("rate", [0.1, 0.3, 0.7])
+def test_a_crossing_at_a_breakpoint_is_taken_there(run, rate, exported):
+    """The rise reaches the height just as the timer stops it; x misses it by a rounding for some rates."""
+    automaton = Staircase(name=f"b{rate}".replace(".", ""), rate=rate, height=3.0 * rate)
+    times = run(automaton, 10.0, exported)
+    assert times == pytest.approx([3.0, 9.0], abs=1e-9)
+
+
+@RUNS
+@pytest.mark.parametrize("rate", [0.1, 0.3, 0.7])
+def test_a_crossing_at_the_end_time_is_taken_there(run, rate, exported):
+    automaton = Staircase(name=f"e{rate}".replace(".", ""), rate=rate, height=2.9 * rate, period=100.0)
+    times = run(automaton, 2.9, exported)
+    assert times == pytest.approx([2.9], abs=1e-9)
+
+
+@RUNS
+def test_what_misses_by_more_than_the_tolerance_is_not_taken(run, exported):
+    automaton = Staircase(name="miss", rate=0.1, height=0.3 + 1e-8)
+    assert len(run(automaton, 5.0, exported)) == 0
+
+
+class TwoGuards(hm.HybridAutomaton):
+    """Two guards of one state reach their levels at the end time; the first jump takes the second's reason away."""
+
+    x = hm.State(0.0)
+    first = hm.DiscreteState(0)
+    second = hm.DiscreteState(0)
+
+    def flow_map(self, s):
+        return {"x": 0.1}
+
+    def level(self, s):
+        return s.x - 0.29
+
+    def reset_first(self, s):
+        return {"x": 0.0, "first": s.first + 1}
+
+    def reset_second(self, s):
+        return {"second": s.second + 1, "x": 0.0}
+
+    transitions = (hm.Jump("first", level, reset_first), hm.Jump("second", level, reset_second))
+
+
+def test_a_jump_that_lowers_the_margin_takes_the_other_guard_back():
+    arc = hm.simulate(TwoGuards(), 2.9)
+    assert [jump.name for jump in arc.jumps] == ["first"]
