@@ -5,6 +5,7 @@ end are the ways in which importers run an FMU.
 """
 
 import ctypes as c
+import random
 from pathlib import Path
 from typing import NamedTuple
 
@@ -241,3 +242,50 @@ def advance(instance, points, *, obey=False, changes=()):
                     instance.set(name, value)
         samples.append((t, tuple(map(instance.get, instance.library.outputs))))
     return Record(samples, ticks, False, n_steps)
+
+
+class Walk:
+    """An importer that can stop between any two calls: it goes on from where the instance is.
+
+    What it does next is decided by what the instance is in, by `rng`, and by nothing else.
+    """
+
+    def __init__(self, instance, *, inputs=()):
+        self.instance = instance
+        self.inputs = inputs
+        self.mode, self.t, self.over = "event" if instance.events else "step", instance.get("time"), False
+
+    def copy_place(self):
+        return self.mode, self.t, self.over
+
+    def return_to(self, place):
+        self.mode, self.t, self.over = place
+
+    def call(self, rng):
+        """One call; everything that can be seen after it, as exact numbers."""
+        instance = self.instance
+        if self.over:
+            return ("over", instance.step(self.t, 0.1) if self.mode == "step" else None)
+        if self.mode == "event":
+            if self.inputs and rng.random() < 0.3:
+                instance.set(rng.choice(self.inputs), rng.uniform(-0.1, 0.3))
+            ticks = instance.ticks()
+            seen = instance.update()
+            self.over = seen.terminate
+            if not seen.again and not seen.terminate:
+                instance.do("EnterStepMode")
+                self.mode = "step"
+            return ticks, seen, instance.values()
+        seen = instance.step(self.t, rng.choice([1e-3, 0.02, 0.11, 0.4]))
+        assert seen.status == OK, instance.messages
+        self.t, self.over = seen.time, seen.terminate
+        if seen.event and instance.events:
+            before = instance.values()
+            instance.do("EnterEventMode")
+            self.mode = "event"
+            return seen, before, instance.values()
+        return seen, instance.values()
+
+    def run(self, seed, n):
+        rng = random.Random(seed)
+        return [self.call(rng) for _ in range(n)]

@@ -5,7 +5,7 @@ import random
 
 import pytest
 from catalogue import cases
-from fmu_driver import ERROR, OK, Instance, Library
+from fmu_driver import ERROR, OK, Instance, Library, Walk
 from witnesses import Cascade, Mix, Ramps
 
 from hybrid_model.models import BouncingBall
@@ -21,53 +21,6 @@ def library(exported):
         return found[key]
 
     return load
-
-
-class Walk:
-    """An importer that can stop between any two calls: it goes on from where the instance is.
-
-    What it does next is decided by what the instance is in, by `rng`, and by nothing else.
-    """
-
-    def __init__(self, instance, *, inputs=()):
-        self.instance = instance
-        self.inputs = inputs
-        self.mode, self.t, self.over = "event" if instance.events else "step", instance.get("time"), False
-
-    def copy_place(self):
-        return self.mode, self.t, self.over
-
-    def return_to(self, place):
-        self.mode, self.t, self.over = place
-
-    def call(self, rng):
-        """One call; everything that can be seen after it, as exact numbers."""
-        instance = self.instance
-        if self.over:
-            return ("over", instance.step(self.t, 0.1) if self.mode == "step" else None)
-        if self.mode == "event":
-            if self.inputs and rng.random() < 0.3:
-                instance.set(rng.choice(self.inputs), rng.uniform(-0.1, 0.3))
-            ticks = instance.ticks()
-            seen = instance.update()
-            self.over = seen.terminate
-            if not seen.again and not seen.terminate:
-                instance.do("EnterStepMode")
-                self.mode = "step"
-            return ticks, seen, instance.values()
-        seen = instance.step(self.t, rng.choice([1e-3, 0.02, 0.11, 0.4]))
-        assert seen.status == OK, instance.messages
-        self.t, self.over = seen.time, seen.terminate
-        if seen.event and instance.events:
-            before = instance.values()
-            instance.do("EnterEventMode")
-            self.mode = "event"
-            return seen, before, instance.values()
-        return seen, instance.values()
-
-    def run(self, seed, n):
-        rng = random.Random(seed)
-        return [self.call(rng) for _ in range(n)]
 
 
 MODELS = {
@@ -140,6 +93,22 @@ def test_between_a_prediction_and_its_event(library):
         results.append((step, instance.values()))
         instance.free()
     assert results[0] == results[1]
+
+
+def test_values_are_read_anew_after_coming_back(library):
+    """Also where just the same values have been read before: nothing of the state left behind is shown."""
+    instance = started(library, limit_a=0.25)
+    for _ in range(2):
+        initial, saved = instance.values(), instance.save()
+        instance.iterate()
+        instance.do("EnterStepMode")
+        instance.step(0.0, 0.25)
+        instance.do("EnterEventMode")
+        assert instance.values() != initial
+        instance.load(saved)
+        assert instance.values() == initial
+        instance.do("FreeFMUState", c.byref(saved))
+    instance.free()
 
 
 def test_event_that_pends(library):
