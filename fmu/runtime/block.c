@@ -89,10 +89,11 @@ static void *take(Cursor *cursor, size_t size)
 
 static Point take_point(Cursor *cursor, const Model *m)
 {
-    double *values = take(cursor, (2 + m->n_states + m->n_discrete) * sizeof(double));
+    double *values = take(cursor, (2 + m->n_states + m->n_discrete + m->n_margins) * sizeof(double));
     if (!values)
-        return (Point){NULL, NULL, NULL, NULL};
-    return (Point){values, values + 1, values + 2, values + 2 + m->n_states};
+        return (Point){NULL, NULL, NULL, NULL, NULL};
+    double *x = values + 2, *z = x + m->n_states;
+    return (Point){values, values + 1, x, z, z + m->n_discrete};
 }
 
 /* Lays out the block; called once with no memory, to learn the size. */
@@ -184,7 +185,8 @@ void copy_values(double *to, const double *from, size_t n)
 
 void copy_point(const Engine *engine, const Point *from, const Point *to)
 {
-    copy_values(to->time, from->time, 2 + engine->model->n_states + engine->model->n_discrete);
+    const Model *m = engine->model;
+    copy_values(to->time, from->time, 2 + m->n_states + m->n_discrete + m->n_margins);
 }
 
 void engine_reset(Engine *engine)

@@ -27,6 +27,8 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
 {
     double end = fmin(limit, piece_end);
     double level = 0.0;
+    for (size_t i = 0; i < engine->model->n_margins; i++)
+        point->level[i] = 0.0;
     if (!step_begin(engine, point) || (locate && !flow_may_begin(engine, point, &level)))
         return FLOW_PROBLEM;
     while (*point->time < end) {
@@ -39,6 +41,8 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
             FlowEnd found = locate_event(engine, point, level, piece_end);
             if (found != FLOW_REACHED)
                 return found;
+            if (engine->step.t1 >= end && !raise_levels(engine, point, engine->step.t1))
+                return FLOW_PROBLEM;
         }
         step_commit(engine, point);
     }

@@ -138,7 +138,7 @@ bool first_enabled(Engine *engine, const Point *point, size_t *jump)
     for (size_t j = 0; j < m->n_jumps; j++) {
         const ModelJump *entry = &m->jumps[j];
         bool due = entry->kind == JUMP_ON_TIME ? !entry->internal && engine->times[entry->index] <= *point->time
-                                               : engine->margins[entry->index] >= 0.0;
+                                               : engine->margins[entry->index] >= point->level[entry->index];
         if (due && entry->kind == JUMP_ON_STATE && !asked) {
             if (!flow_is_over(engine, point, &open))
                 return false;
@@ -179,6 +179,8 @@ static bool take_jump(Engine *engine, size_t jump)
     changed(engine);
     if (!apply_reset(engine, jump, &engine->live) || !take_internal_jumps(engine, &engine->live))
         return end_run(engine);
+    if (engine->model->jumps[jump].kind == JUMP_ON_STATE)
+        engine->live.level[engine->model->jumps[jump].index] = 0.0;
     tick(engine, jump);
     return count_jump(engine, jump) || end_run(engine);
 }

@@ -355,6 +355,22 @@ static FlowEnd leave_flow_set(Search *search, double t)
     return FLOW_PROBLEM;
 }
 
+bool raise_levels(Engine *engine, const Point *point, double t)
+{
+    const Model *m = engine->model;
+    Search search = {.engine = engine, .point = point, .level = 0.0, .piece_end = t,
+                     .n_rows = m->n_margins + 1, .exit_row = m->n_margins, .failed = false};
+    double *now = engine->samples, *then = engine->samples + search.n_rows;
+    if (m->n_margins == 0 || m->flow_priority)
+        return true;
+    if (!look(&search, ON_STEP, t, now) || !look(&search, ON_STEP, t + event_tolerance(t), then))
+        return false;
+    for (size_t row = 0; row < m->n_margins; row++)
+        if (engine->is_guard[row] && now[row] < 0.0 && then[row] >= 0.0)
+            point->level[row] = now[row];
+    return true;
+}
+
 FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end)
 {
     const Model *m = engine->model;
@@ -375,7 +391,9 @@ FlowEnd locate_event(Engine *engine, const Point *point, double level, double pi
         return FLOW_PROBLEM;
     if (has_guard && (!leaves || guard <= leaving + event_tolerance(leaving))) {
         guard = common_time(&search, guard);
-        return search.failed ? FLOW_PROBLEM : move_to(&search, guard);
+        if (search.failed || (guard + event_tolerance(guard) > piece_end && !raise_levels(engine, point, guard)))
+            return FLOW_PROBLEM;
+        return move_to(&search, guard);
     }
     return leaves ? leave_flow_set(&search, leaving) : FLOW_REACHED;
 }

@@ -23,13 +23,16 @@
 #define ADVANCE_STEPS 1000000
 #define TIME_EVENT_REPEATS 1000000
 
-/* A point of the run.  time, step, x and z lie one after the other in memory, so one copy moves
-   them all; step is the solver's proposal for the next step, 0 when there is none. */
+/* A point of the run.  time, step, x, z and level lie one after the other in memory, so one copy
+   moves them all; step is the solver's proposal for the next step, 0 when there is none.  level is
+   the margin from which on each guard is enabled: 0, or slightly below where a flow ended so shortly
+   before the crossing that it counts as reached. */
 typedef struct {
     double *time;
     double *step;
     double *x;
     double *z;
+    double *level;
 } Point;
 
 /* The solver's step from x0 at t0 to x1 at t1. */
@@ -151,6 +154,10 @@ bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *
 bool flow_may_begin(Engine *engine, const Point *point, double *level);
 /* Looks for the first event on the present step; FLOW_EVENT moves the point there. */
 FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end);
+/* Enables the guards that would cross within the event tolerance after `t`, a time on or at the end of
+   the present step, if the flow could go on: neither a breakpoint nor the end of a run may hide a
+   crossing that rounding puts behind it. */
+bool raise_levels(Engine *engine, const Point *point, double t);
 
 /* zeno.c */
 /* Records a jump of the live point at its time; false if it is one too many. */
