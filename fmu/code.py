@@ -10,7 +10,7 @@ import numpy as np
 
 from fmu.trace import Trace
 from fmu.variables import Bank, FmuVariable
-from hybrid_model.automaton import Priority, Trigger
+from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import Kind
 
 _OPTIONS: dict[str, Any] = {

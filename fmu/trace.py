@@ -15,8 +15,8 @@ import numpy as np
 from fmu.errors import TraceError
 from fmu.symbols import expressions, symbol_vector, symbols
 from hybrid_model import Automaton, Values
-from hybrid_model.automaton import Assignments, Trigger
 from hybrid_model.layout import Layout
+from hybrid_model.transitions import Assignments, Trigger
 from hybrid_model.variables import Kind
 
 

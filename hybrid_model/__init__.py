@@ -1,7 +1,7 @@
 """Hybrid automata: declare them once, run them event-exactly, export and co-simulate them."""
 
 from hybrid_model.arc import HybridArc
-from hybrid_model.automaton import Automaton, Clock, HybridAutomaton, Jump, Priority, TimeEvent
+from hybrid_model.automaton import Automaton, HybridAutomaton
 from hybrid_model.compose import Composition
 from hybrid_model.errors import (
     AlgebraicLoopError,
@@ -16,6 +16,7 @@ from hybrid_model.signals import Signal
 from hybrid_model.simulate import simulate
 from hybrid_model.solver import Method, Solver
 from hybrid_model.stop import Stop
+from hybrid_model.transitions import Clock, Jump, Priority, TimeEvent
 from hybrid_model.variables import Dimension, DiscreteState, Input, Output, Parameter, State, Values
 from hybrid_model.zeno import ZenoGuard
 

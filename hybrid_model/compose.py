@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from hybrid_model.automaton import Assignments, Automaton, ClockInfo, JumpInfo, Priority, Trigger
+from hybrid_model.automaton import Automaton
 from hybrid_model.errors import AlgebraicLoopError, WiringError
 from hybrid_model.layout import Layout
+from hybrid_model.transitions import Assignments, ClockInfo, JumpInfo, Priority, Trigger
 from hybrid_model.variables import Kind, Value, Values, Variable, unknown_name
 
 Source = str | Sequence[str]

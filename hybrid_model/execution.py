@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid_model.automaton import Automaton, Priority, Trigger
+from hybrid_model.automaton import Automaton
 from hybrid_model.errors import SimulationError
 from hybrid_model.flow import FlowPiece, integrate
 from hybrid_model.layout import Layout, not_finite
 from hybrid_model.signals import Inputs
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
+from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import FloatArray, Kind, Values
 from hybrid_model.zeno import ZenoGuard, ZenoMonitor
 
@@ -105,6 +106,10 @@ class Execution:
         self.message = ""
         self.next_step: float | None = None
         self._left_flow_set = False
+        self._whole = np.repeat(
+            [place.variable.integer for place in self.layout.places[Kind.DISCRETE]],
+            [place.variable.size for place in self.layout.places[Kind.DISCRETE]],
+        ).astype(bool)
         self.levels = self._zero_levels()
         self.compute_start()
 
@@ -164,6 +169,7 @@ class Execution:
         self.x = self.layout.pack(Kind.STATE, new, x)
         self.z = self.layout.pack(Kind.DISCRETE, new, z)
         self._require_finite(f"after jump {info.name!r} at t = {self.t:.9g} s")
+        self._require_whole(f"after jump {info.name!r} at t = {self.t:.9g} s")
         record = JumpRecord(self.t, self.j, index, info.name, x, z, self.x, self.z)
         self.j += 1
         self._left_flow_set = False
@@ -287,6 +293,15 @@ class Execution:
         bad = not_finite(self.layout.names(Kind.STATE), self.x) or not_finite(self.layout.names(Kind.DISCRETE), self.z)
         if bad:
             raise SimulationError(f"{self.automaton.name}: {bad} {when}: states must stay finite numbers.")
+
+    def _require_whole(self, when: str) -> None:
+        whole = self._whole & (self.z != np.round(self.z))
+        if np.any(whole):
+            k = int(np.argmax(whole))
+            raise SimulationError(
+                f"{self.automaton.name}: {self.layout.names(Kind.DISCRETE)[k]} = {self.z[k]:.9g} {when}: it is "
+                "declared integer and must stay a whole number."
+            )
 
     def _require_progress(self, index: int, before: Values) -> None:
         infos = self.automaton.jumps

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid_model.automaton import Priority, Trigger
 from hybrid_model.errors import SimulationError
 from hybrid_model.layout import not_finite
 from hybrid_model.locate import first_nonnegative, rise_in_samples, scan_times, ulp
+from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import FloatArray, Kind
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid_model.automaton import Assignments, Automaton
+from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DeclarationError
+from hybrid_model.transitions import Assignments
 from hybrid_model.variables import FloatArray, Kind, Value, Values, Variable, element_names
 
 

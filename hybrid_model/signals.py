@@ -62,6 +62,11 @@ class Inputs:
                 self._signals.append((places[name], value.value))
                 breakpoints += _finite_breakpoints(name, value)
             elif callable(value):
+                if places[name].variable.discrete:
+                    raise DeclarationError(
+                        f"{layout.automaton.name}: input {name} changes at jumps only, so it cannot be a plain "
+                        "function of time: give a number, or a Signal with the times at which it changes."
+                    )
                 self._signals.append((places[name], value))
             else:
                 self.hold(name, value)

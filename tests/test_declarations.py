@@ -284,3 +284,37 @@ def test_a_value_asked_for_by_a_wrong_name_says_which_there_are():
 def test_errors_are_of_one_family():
     for kind in (hm.DeclarationError, hm.WiringError, hm.AlgebraicLoopError, hm.SimulationError):
         assert issubclass(kind, hm.HybridModelError)
+
+
+class Follower(hm.HybridAutomaton):
+    """Starts where its input is; counts in steps of `step`."""
+
+    u = hm.Input(1.0, discrete=True)
+    held = hm.DiscreteState(computed=True)
+    count = hm.DiscreteState(0, integer=True)
+    step = hm.Parameter(1.0)
+
+    def start_map(self, s):
+        return {"held": s.u}
+
+    def jump_set(self, s):
+        return abs(s.u - s.held) - 0.5
+
+    def jump_map(self, s):
+        return {"held": s.u, "count": s.count + s.step}
+
+
+def test_a_value_for_a_computed_state_is_refused():
+    with pytest.raises(hm.DeclarationError, match=r"held is computed by start_map.*cannot be given"):
+        Follower(held=2.0)
+
+
+def test_a_jump_that_gives_an_integer_state_a_fraction_is_refused():
+    steps = hm.Signal(lambda t: 1.0 + (t >= 1.0), [1.0])
+    with pytest.raises(hm.SimulationError, match=r"count = 0\.5 after jump 'jump' at t = 1 s.*whole"):
+        hm.simulate(Follower(step=0.5), 2.0, inputs={"u": steps})
+
+
+def test_a_plain_function_on_a_discrete_input_is_refused():
+    with pytest.raises(hm.DeclarationError, match=r"input u changes at jumps only.*Signal"):
+        hm.simulate(Follower(), 2.0, inputs={"u": lambda t: t})

@@ -44,7 +44,7 @@ def test_maps_that_cannot_be_traced_are_refused(maps, sentence):
 
 def test_vector_margins_are_refused():
     block = automaton(**FLOW, jump_set=lambda self, s: np.stack([s.x, -s.x]), jump_map=lambda self, s: {"x": 0.0})
-    with pytest.raises(hm.DeclarationError, match="join the elements with np.min"):
+    with pytest.raises(hm.DeclarationError, match=r"join the elements with np\.min"):
         trace(block)
 
 
