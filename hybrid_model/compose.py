@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hybrid_model.automaton import Automaton
-from hybrid_model.errors import AlgebraicLoopError, WiringError
+from hybrid_model.errors import AlgebraicLoopError, DeclarationError, WiringError
 from hybrid_model.layout import Layout
 from hybrid_model.transitions import Assignments, ClockInfo, JumpInfo, Priority, Trigger
 from hybrid_model.variables import Kind, Value, Values, Variable, unknown_name
@@ -76,13 +76,18 @@ class Composition(Automaton):
             if variable.name not in self._wires[part]
         )
         self._own = {
-            part: [
-                (variable.name, self._names[part, variable.name])
+            part: {"t": "t"}
+            | {
+                variable.name: self._names[part, variable.name]
                 for variable in automaton.variables
                 if variable.kind is not Kind.OUTPUT and variable.name not in self._wires[part]
-            ]
+            }
             for part, automaton in self.parts.items()
         }
+        # Most parts have no say in most maps: these lists keep evaluation short.
+        self._with_states = [(p, a) for p, a in self.parts.items() if a.of_kind(Kind.STATE)]
+        self._with_guards = [(p, a) for p, a in self.parts.items() if any(j.trigger is Trigger.STATE for j in a.jumps)]
+        self._with_times = [(p, a) for p, a in self.parts.items() if any(j.trigger is Trigger.TIME for j in a.jumps)]
         self._computed = {(p, v.name) for p, automaton in self.parts.items() for v in automaton.of_kind(Kind.OUTPUT)}
         self._owner = [(part, k) for part, automaton in self.parts.items() for k in range(len(automaton.jumps))]
         self.jumps = tuple(
@@ -116,28 +121,29 @@ class Composition(Automaton):
         """See `Automaton.derivatives`."""
         scopes = _Scopes(self, s)
         rates: dict[str, Value] = {}
-        for part, automaton in self.parts.items():
+        for part, automaton in self._with_states:
             rates.update(self._scoped(part, automaton.derivatives(scopes.of(part))))
         return rates
 
     def flow_margin(self, s: Values) -> Value:
         """See `Automaton.flow_margin`: the intersection of the parts' flow sets."""
         scopes = _Scopes(self, s)
-        margin: Value = np.inf
+        margin: Value = None
         for part, automaton in self.parts.items():
             if automaton.has_flow_set:
-                margin = np.minimum(automaton.flow_margin(scopes.of(part)), margin)
+                own = automaton.flow_margin(scopes.of(part))
+                margin = own if margin is None else np.minimum(margin, own)
         return margin
 
     def jump_margins(self, s: Values) -> list[Value]:
         """See `Automaton.jump_margins`."""
         scopes = _Scopes(self, s)
-        return [m for part, automaton in self.parts.items() for m in automaton.jump_margins(scopes.of(part))]
+        return [m for part, automaton in self._with_guards for m in automaton.jump_margins(scopes.of(part))]
 
     def event_times(self, s: Values) -> list[Value]:
         """See `Automaton.event_times`."""
         scopes = _Scopes(self, s)
-        return [time for part, automaton in self.parts.items() for time in automaton.event_times(scopes.of(part))]
+        return [time for part, automaton in self._with_times for time in automaton.event_times(scopes.of(part))]
 
     def reset(self, jump: int, s: Values) -> Assignments:
         """See `Automaton.reset`."""
@@ -152,10 +158,6 @@ class Composition(Automaton):
             if automaton.of_kind(Kind.OUTPUT):
                 values.update(self._scoped(part, scopes.outputs(part)))
         return values
-
-    def name_of(self, part: str, variable: str) -> str:
-        """Return the name that a part's variable has in the composition."""
-        return self._names[part, variable]
 
     def _scoped(self, part: str, assignments: Assignments) -> dict[str, Value]:
         return {self._names[part, key]: value for key, value in assignments.items()}
@@ -182,11 +184,7 @@ class _Scopes:
     def of(self, part: str) -> Values:
         """Return the values of one part."""
         if part not in self._parts:
-            s = self._s
-            own: dict[str, Value] = {local: s[name] for local, name in self._composition._own[part]}
-            own["t"] = s["t"]
-            wires = self._composition._wires[part]
-            self._parts[part] = _PartValues(self._composition.parts[part].name, own, self, wires)
+            self._parts[part] = _PartValues(self._composition, part, self, self._s)
         return self._parts[part]
 
     def outputs(self, part: str) -> Assignments:
@@ -217,19 +215,28 @@ class _Scopes:
 
 
 class _PartValues(Values):
-    """Values of a part; wired inputs are fetched when asked for, so that only real dependencies count as loops."""
+    """Values of a part, each fetched when it is asked for, so that only real dependencies count as loops."""
 
-    __slots__ = ("_scopes", "_wires")
+    __slots__ = ("_own", "_s", "_scopes", "_wires")
 
-    def __init__(self, owner: str, values: dict[str, Value], scopes: _Scopes, wires: Mapping[str, _Wire]) -> None:
-        super().__init__(owner, values)
+    def __init__(self, composition: Composition, part: str, scopes: _Scopes, s: Values) -> None:
+        super().__init__(composition.parts[part].name, {})
+        self._own = composition._own[part]
+        self._wires = composition._wires[part]
         self._scopes = scopes
-        self._wires = wires
+        self._s = s
 
     def __getitem__(self, name: str) -> Value:
-        if name not in self._values and name in self._wires:
-            self._values[name] = self._scopes.wired(self._wires[name])
-        return super().__getitem__(name)
+        value = self._values.get(name)
+        if value is None:
+            if name in self._own:
+                value = self._s[self._own[name]]
+            elif name in self._wires:
+                value = self._scopes.wired(self._wires[name])
+            else:
+                raise DeclarationError(unknown_name(self._owner, name, {**self._own, **self._wires}))
+            self._values[name] = value
+        return value
 
 
 def _wires(composition: Composition, connections: Mapping[str, Source]) -> dict[tuple[str, str], _Wire]:

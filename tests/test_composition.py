@@ -93,7 +93,6 @@ def test_names_replace_scoped_names_of_variables_and_clocks():
     one = hm.Composition("one", {"ball": BouncingBall()}, names={"ball.h": "height", "ball.impact": "bell"})
     assert [v.name for v in one.variables] == ["height", "ball.v", "ball.g", "ball.e"]
     assert [(clock.name, clock.jump) for clock in one.clocks] == [("bell", 0)]
-    assert one.name_of("ball", "h") == "height"
     assert hm.simulate(one, 0.1).end["height"] == pytest.approx(1.0 - 9.81 / 2 * 0.01, abs=1e-14)
 
 
