@@ -24,10 +24,10 @@ PUBLISHED = {
 """Reference values of scenario A: events per agent, shortest gap in s, x(50)."""
 
 
-def compare(report, exact):
+def compare(scenario, report, exact):
     assert report.events_per_agent == exact.counts
     for times, expected in zip(report.event_times, exact.event_times, strict=True):
-        np.testing.assert_allclose(times, expected, rtol=0, atol=TIME_TOLERANCE)
+        assert np.all(np.abs(times - expected) <= [time_tolerance(scenario, t) for t in expected])
     np.testing.assert_allclose(report.x_end, exact.x_end, rtol=0, atol=STATE_TOLERANCE)
 
 
@@ -40,7 +40,13 @@ def test_paper_example_has_the_published_events_and_end(preset):
     assert report.min_gap == pytest.approx(gap, abs=5e-7)
     np.testing.assert_allclose(report.x_end, x_end, rtol=0, atol=STATE_TOLERANCE)
     assert report.mean_drift < 1e-12
-    compare(report, exact_run(scenario))
+    compare(scenario, report, exact_run(scenario))
+
+
+def time_tolerance(scenario, t):
+    """The limit, and more where all weights are nearly zero: a state error of 1e-13 moves an event by 1e-13/speed."""
+    weight = float(np.max(scenario.edge_weights.value(t)))
+    return TIME_TOLERANCE + (1e-13 / max(weight, 1e-8) if weight > 0.0 else 0.0)
 
 
 def two_agents(**weights):
@@ -124,14 +130,14 @@ def weights(edges):
 @given(scenario=scenarios())
 def test_any_scenario_runs_like_the_exact_solution(scenario):
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
-    compare(run_report(scenario, arc), exact_run(scenario))
+    compare(scenario, run_report(scenario, arc), exact_run(scenario))
 
 
 @settings(max_examples=15, deadline=None)
 @given(scenario=scenarios())
 def test_any_scenario_runs_event_by_event_like_the_exact_solution(scenario):
     result = run_event_exact(in_process_system(scenario), scenario.stop_time)
-    compare(network_report(scenario, result), exact_run(scenario))
+    compare(scenario, network_report(scenario, result), exact_run(scenario))
 
 
 @pytest.mark.long
@@ -139,4 +145,4 @@ def test_any_scenario_runs_event_by_event_like_the_exact_solution(scenario):
 @given(scenario=scenarios())
 def test_many_scenarios_run_like_the_exact_solution(scenario):
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
-    compare(run_report(scenario, arc), exact_run(scenario))
+    compare(scenario, run_report(scenario, arc), exact_run(scenario))
