@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid_model as hm
+from hybrid_model.consensus.thresholds import exponential_threshold
 from hybrid_model.variables import Value
 
 
@@ -75,7 +76,7 @@ class DynamicTrigger(EventGenerator):
 
     def threshold_now(self, s: hm.Values) -> Value:
         """``c exp(-beta t)``."""
-        return s.threshold * np.exp(-s.decay * s.t)
+        return exponential_threshold(s.threshold, s.decay, s.t)
 
 
 def agent(

@@ -12,6 +12,7 @@ from hybrid_model.consensus.edge_weights import EdgeWeights
 from hybrid_model.consensus.graphs import Edge, complete_edges, validate_edges
 from hybrid_model.consensus.switching import Switching
 from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.thresholds import exponential_threshold
 from hybrid_model.consensus.weights import ConstantWeight, Waveform
 
 __all__ = [
@@ -158,7 +159,7 @@ class Trigger:
 
     def level(self, t: ArrayLike) -> NDArray[np.float64]:
         """The threshold at time `t` [s]."""
-        return np.asarray(self.threshold * np.exp(-self.decay * np.asarray(t, dtype=float)))
+        return np.asarray(exponential_threshold(self.threshold, self.decay, np.asarray(t, dtype=float)))
 
 
 @dataclass(frozen=True)
