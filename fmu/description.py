@@ -63,6 +63,8 @@ def model_description(
         hasEventMode="true",
     )
     _units(root, variables)
+    categories = ET.SubElement(root, "LogCategories")
+    ET.SubElement(categories, "Category", name="logStatusError", description="refused calls, and why a run ended")
     if stop_time is not None:
         ET.SubElement(root, "DefaultExperiment", startTime="0", stopTime=repr(float(stop_time)))
     listed = ET.SubElement(root, "ModelVariables")

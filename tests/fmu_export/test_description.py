@@ -48,6 +48,11 @@ def test_agent_has_the_parameters_inputs_and_outputs_that_its_users_need(exporte
     assert description.coSimulation.canHandleVariableCommunicationStepSize
 
 
+def test_the_log_category_that_the_fmu_uses_is_declared(exported):
+    description = read_model_description(str(exported(cases()["bouncing_ball"].automaton, "bouncing_ball")))
+    assert [category.name for category in description.logCategories] == ["logStatusError"]
+
+
 def test_bookkeeping_of_schedules_is_not_shown(exported):
     description = read_model_description(str(exported(cases()["agent2_dynamic"].automaton, "agent2_dynamic")))
     assert not [v.name for v in description.modelVariables if "segment" in v.name or "interval" in v.name]
