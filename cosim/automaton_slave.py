@@ -53,6 +53,11 @@ class AutomatonSlave(Slave):
         self._ahead: Lookahead | None = None
         self._ticks: list[str] = []
 
+    @property
+    def variable_names(self) -> list[str]:
+        """See `Slave.variable_names`."""
+        return list(self._places)
+
     def set(self, name: str, value: float) -> None:
         """See `Slave.set`."""
         if name not in self._places:

@@ -65,6 +65,11 @@ class FmuSlave(Slave):
         self._starts: dict[str, float] = {}
         self._getters: dict[str, tuple[Callable[[list[int]], list[Any]], list[int]]] = {}
 
+    @property
+    def variable_names(self) -> list[str]:
+        """See `Slave.variable_names`."""
+        return list(self._variables)
+
     def set(self, name: str, value: float) -> None:
         """See `Slave.set`."""
         if name not in self._variables:

@@ -169,5 +169,9 @@ class Slave(ABC):
 
     def unknown(self, name: str) -> MisfitError:
         """Return the error for a name that the block does not have."""
-        known = ", ".join([*self.inputs, *self.outputs])
-        return MisfitError(f"{self.name} has no variable {name!r}; its inputs and outputs are {known}.")
+        return MisfitError(f"{self.name} has no variable {name!r}; it has {', '.join(self.variable_names)}.")
+
+    @property
+    @abstractmethod
+    def variable_names(self) -> list[str]:
+        """Names of all variables, parameters included."""

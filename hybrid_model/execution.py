@@ -16,12 +16,16 @@ from hybrid_model.automaton import Automaton
 from hybrid_model.errors import SimulationError
 from hybrid_model.flow import FlowPiece, integrate
 from hybrid_model.layout import Layout, not_finite
+from hybrid_model.locate import ulp
 from hybrid_model.signals import Inputs
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
 from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import FloatArray, Kind, Values
 from hybrid_model.zeno import ZenoGuard, ZenoMonitor
+
+ROUNDING = 8.0
+"""Time events closer than this many ulp differ by rounding: 3 * 0.1 and 0.3 are one time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +148,7 @@ class Execution:
             return None
         s = self.values()
         margins, levels, times = iter(self.jump_margins(s)), iter(self.levels), iter(self.event_times(s))
-        may_jump = self.automaton.priority is Priority.JUMP or self._left_flow_set or not self.in_flow_set(0.0)
+        may_jump = self.automaton.priority is Priority.JUMP or self._left_flow_set or self._flow_is_over()
         for index, info in enumerate(self.automaton.jumps):
             if info.trigger is Trigger.STATE:
                 if next(margins) >= next(levels) and may_jump:
@@ -182,11 +186,26 @@ class Execution:
         message = self.monitor.record(self.automaton.name, info.name, self.t, on_state=on_state)
         if message:
             self.stopped, self.message = Stop.ZENO, message
+        elif self.j >= self.monitor.guard.max_jumps:
+            self.stopped = Stop.JUMPS
+            self.message = f"{self.automaton.name}: {self.j} jumps by t = {self.t:.9g} s. {Stop.JUMPS.value}"
         return record
 
     def in_flow_set(self, tolerance: float) -> bool:
         """Whether the state lies in the flow set, or outside by no more than `tolerance`."""
         return not self.automaton.has_flow_set or self.flow_margin(self.values()) >= -tolerance
+
+    def _flow_is_over(self) -> bool:
+        """Whether the state is outside the flow set; on the border, up to rounding, whether the flow leads out."""
+        if not self.automaton.has_flow_set:
+            return False
+        margin = self.flow_margin(self.values())
+        tolerance = self.solver.event_tolerance
+        if margin > 0.0 or margin < -tolerance:
+            return margin < 0.0
+        with np.errstate(all="ignore"):
+            rates = self.layout.pack(Kind.STATE, self.automaton.derivatives(self.values()))
+        return self.flow_margin(self.values_at(self.t + tolerance, self.x + tolerance * rates)) < margin
 
     # Margins and times, which must be numbers (rule 10).
 
@@ -226,8 +245,13 @@ class Execution:
     # Flow.
 
     def next_time_event(self) -> float:
-        """Return the earliest known time, in s, at which a time event or an input's breakpoint comes."""
-        return min([*self.event_times(self.values()), self.inputs.next_breakpoint(self.t)])
+        """Return the earliest known time, in s, at which a time event or an input's breakpoint comes.
+
+        Times that differ by rounding only are one: the latest of them.
+        """
+        times = [*self.event_times(self.values()), self.inputs.next_breakpoint(self.t)]
+        first = min(times)
+        return max(time for time in times if time <= first + ROUNDING * ulp(first)) if math.isfinite(first) else first
 
     def flow(self, limit: float) -> list[FlowPiece]:
         """Flow to the first event or to `limit`, whichever comes first, and never across a time event (rule 5).
@@ -251,7 +275,7 @@ class Execution:
             self._block("the state is in neither the flow set nor the jump set")
             return []
         self.levels = self._zero_levels()
-        pieces, left = integrate(self, min(limit, self.next_time_event()))
+        pieces, left = integrate(self, limit, self.next_time_event())
         self._left_flow_set = left
         tolerance = self.solver.event_tolerance
         # Under flow priority a state that is outside by rounding flows on while it stays so (rule 3).

@@ -56,8 +56,8 @@ class FlowPiece:
         return self.x1 if t >= self.t1 else self.interpolate(t)
 
 
-def integrate(execution: Execution, end: float) -> tuple[list[FlowPiece], bool]:
-    """Move an execution along its flow to `end`, or to the first event before it.
+def integrate(execution: Execution, limit: float, time_event: float) -> tuple[list[FlowPiece], bool]:
+    """Move an execution along its flow to `limit` or the next time event, or to the first event before them.
 
     Returns
     -------
@@ -67,6 +67,7 @@ def integrate(execution: Execution, end: float) -> tuple[list[FlowPiece], bool]:
         Whether the flow ended by leaving the flow set.
     """
     pieces: list[FlowPiece] = []
+    end = min(limit, time_event)
     watch = _Watch(execution)
     if end - execution.t <= SHORTEST * ulp(end):
         x1 = execution.x + (end - execution.t) * _FlowMap(execution, end)(execution.t, execution.x)
@@ -83,6 +84,8 @@ def integrate(execution: Execution, end: float) -> tuple[list[FlowPiece], bool]:
         pieces.append(_move(execution, FlowPiece(piece.t0, t, piece.x0, x, piece.interpolate)))
         if t + execution.solver.event_tolerance > end:
             watch.raise_levels(pieces[-1])
+            if not left and t < end == time_event:
+                pieces.append(watch.go_on_to(end))
         return pieces, left
     if pieces:
         watch.raise_levels(pieces[-1])
@@ -244,6 +247,16 @@ class _Watch:
         soon = piece.t1 + self._tolerance
         then = self._margins(soon, piece.interpolate(soon))[: self._guards]
         execution.levels = np.where((now < 0.0) & (then >= 0.0), now, 0.0)
+
+    def go_on_to(self, end: float) -> FlowPiece:
+        """Take a guard that is crossed within the tolerance before a time event to that event's instant (rule 6)."""
+        execution = self._execution
+        t, x = execution.t, execution.x
+        enabled = self._margins(t, x)[: self._guards] >= execution.levels
+        piece = _move(execution, _straight(t, end, x, x + (end - t) * _FlowMap(execution, end)(t, x)))
+        now = self._margins(end, piece.x1)[: self._guards]
+        execution.levels = np.where(enabled & (now < 0.0), now, 0.0)
+        return piece
 
     def _along(self, piece: FlowPiece, row: int) -> Callable[[float], float]:
         def margin(t: float) -> float:

@@ -11,6 +11,10 @@ class Stop(enum.Enum):
         "Jumps accumulate: end the run before the accumulation time, give the jump set a minimum dwell time, "
         "or model what happens after the accumulation as a mode of its own."
     )
+    JUMPS = (
+        "The budget of jumps is used up: raise ZenoGuard.max_jumps if so many are right; else look for events that "
+        "grow ever denser, such as a threshold that decays faster than the states converge."
+    )
     BLOCKED = (
         "The state is in neither set: enlarge the flow set or the jump set where the message says, "
         "or make the jump map land in one of them."

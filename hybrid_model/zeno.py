@@ -35,6 +35,9 @@ class ZenoGuard:
         sum of the geometric series, is below this (or below what floats at that time resolve well enough).
     spread : float
         Relative spread up to which successive ratios of gaps count as one.
+    max_jumps : int
+        More jumps than this, of all names together, end the run with `Stop.JUMPS`: events that grow ever denser
+        without accumulating (a threshold that decays faster than the states converge) have no other end.
     """
 
     jumps_at_once: int = 1000
@@ -42,6 +45,7 @@ class ZenoGuard:
     jumps_in_window: int = 100
     remainder: float = 1e-6
     spread: float = 0.05
+    max_jumps: int = 100_000
 
 
 class ZenoMonitor:

@@ -132,10 +132,23 @@ def test_a_file_that_is_no_fmu_is_status_1(tmp_path, capsys):
 
 def test_unknown_start_values_are_errors(tmp_path, capsys):
     fmu = export_fmu(BouncingBall(), tmp_path / "ball.fmu")
-    assert main(["cosim", str(fmu), "--stop-time", "1", "--start-value", "height=2"]) == 1
-    assert "no variable 'height'" in capsys.readouterr().err
+    assert main(["cosim", str(fmu), "--stop-time", "1", "--start-value", "height=2"]) == 2
+    assert "no variable 'height'; it has time, g, e, h, v" in capsys.readouterr().err
     assert main(["cosim", str(fmu), "--stop-time", "1", "--start-value", "h"]) == 2
     assert "not NAME=VALUE" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("interval", ["0", "-1", "nan"])
+@pytest.mark.parametrize("engine", ["automaton", "network"])
+def test_impossible_output_intervals_are_refused(small, engine, interval, capsys):
+    assert main(["simulate", small, "--engine", engine, "--output-interval", interval]) == 1
+    assert "the output interval is" in capsys.readouterr().err
+
+
+def test_a_stop_time_of_zero_is_refused(small, tmp_path, capsys):
+    assert main(["simulate", small, "--stop-time", "0"]) == 2
+    assert main(["cosim", small, "--stop-time", "0"]) == 1
+    assert "the stop after the start" in capsys.readouterr().err
 
 
 def test_paper_reproduces_compares_and_draws(tmp_path, capsys):

@@ -9,6 +9,7 @@ from typing import Any
 
 from cosim.cli.exits import UsageError, exit_of, progress, start_values, write_csv
 from cosim.consensus import fmu_system
+from cosim.errors import MisfitError
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult
@@ -40,12 +41,12 @@ def run(options: argparse.Namespace) -> int:
     with tempfile.TemporaryDirectory() as folder:
         if Path(options.system).suffix == ".fmu":
             slave = FmuSlave(Path(options.system).stem, options.system)
-            system, stop_time = System([slave], {}), options.stop_time or slave.default_stop_time
-            if stop_time is None:
-                raise UsageError(f"{options.system} proposes no stop time: give --stop-time.")
+            system, stop_time = System([slave], {}), _given(options.stop_time, slave.default_stop_time)
         else:
             scenario = load_scenario(options.system)
-            system, stop_time = _agents(scenario, Path(folder)), options.stop_time or scenario.stop_time
+            system, stop_time = _agents(scenario, Path(folder)), _given(options.stop_time, scenario.stop_time)
+        if stop_time is None:
+            raise UsageError(f"{options.system} proposes no stop time: give --stop-time.")
         for name, value in starts.items():
             _set_start(system, name, value)
         result = _run(system, stop_time, options)
@@ -53,6 +54,11 @@ def run(options: argparse.Namespace) -> int:
         write_csv(options.output_file, result.times, result.signals)
     print(_text(result))
     return exit_of(result.ended.name)
+
+
+def _given(option: float | None, default: float | None) -> float | None:
+    # Not `or`: a stop time of 0 is given, and refused with its own sentence.
+    return default if option is None else option
 
 
 def _agents(scenario: Scenario, folder: Path) -> System:
@@ -69,7 +75,10 @@ def _set_start(system: System, name: str, value: float) -> None:
         owner, name = next(iter(system.slaves)), f"{next(iter(system.slaves))}.{name}"
     if owner is None:
         raise UsageError(f"--start-value {name} names no slave; the slaves are {', '.join(system.slaves)}.")
-    system.slaves[owner].set(name[len(owner) + 1 :], value)
+    try:
+        system.slaves[owner].set(name[len(owner) + 1 :], value)
+    except MisfitError as error:
+        raise UsageError(f"--start-value: {error}") from error
 
 
 def _run(system: System, stop_time: float, options: argparse.Namespace) -> CosimResult:

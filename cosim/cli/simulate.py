@@ -14,6 +14,7 @@ import hybrid_model as hm
 from cosim.cli.exits import exit_of, write_csv
 from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
+from cosim.masters.start import require_times
 from hybrid_model.consensus.network import agent_name, closed_loop
 from hybrid_model.consensus.report import RunReport, run_report
 from hybrid_model.consensus.scenario import load_scenario
@@ -43,6 +44,7 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     scenario = load_scenario(options.scenario)
+    require_times(0.0, scenario.stop_time, options.output_interval, "output interval")
     if options.stop_time is not None:
         scenario = dataclasses.replace(scenario, stop_time=options.stop_time)
     one = options.engine == "automaton" or (options.engine == "auto" and scenario.network.agents <= AUTOMATON_AGENTS)

@@ -125,8 +125,10 @@ class _Run:
         for block in self.blocks.values():
             while not self.ended and block.t < limit:
                 made = self._step(block, limit)
-                if made.event:
-                    self.handle_events(made.reached, {block.slave.name})
+                if made.event and not self.ended:
+                    self._require_announced(block, limit)
+                    block.slave.enter_event_mode()
+                    self.handle_events(limit, {block.slave.name})
         if not self.ended:
             self.result.t = limit
 
@@ -172,13 +174,17 @@ class _Run:
     def _bring(self, block: _Block, t: float) -> None:
         """Bring a slave that receives something to this instant, into event mode."""
         if block.t < t:
-            made = self._step(block, t)
-            if made.reached < t - SIMULTANEOUS:
-                raise CosimError(
-                    f"{block.slave.name} stopped at t = {made.reached:.12g} s for an event that it had not announced, "
-                    f"on the way to {t:.12g} s: its nextEventTime is wrong."
-                )
+            self._step(block, t)
+            self._require_announced(block, t)
         block.slave.enter_event_mode()
+
+    def _require_announced(self, block: _Block, t: float) -> None:
+        """Refuse a stop before `t`; within the tolerance before it, it is rounding."""
+        if block.t < t - SIMULTANEOUS and not self.ended:
+            raise CosimError(
+                f"{block.slave.name} stopped at t = {block.t:.12g} s for an event that it had not announced, on the "
+                f"way to {t:.12g} s: its nextEventTime is wrong."
+            )
 
     def _step(self, block: _Block, t: float) -> Step:
         made = block.slave.step(block.t, t)

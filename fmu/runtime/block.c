@@ -131,6 +131,7 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     engine->probe_x = take(&cursor, vector);
     engine->dense_x = take(&cursor, vector);
     engine->margins = take(&cursor, rows * sizeof(double));
+    engine->enabled = take(&cursor, rows * sizeof(double));
     engine->times = take(&cursor, m->n_times * sizeof(double));
     engine->samples = take(&cursor, (N_SAMPLES + 1) * rows * sizeof(double));
     engine->outputs = take(&cursor, m->n_outputs * sizeof(double));

@@ -5,18 +5,24 @@
 
 #include "parts.h"
 
-/* The next time event after the point; visible ones only if asked for. */
+/* The next time event after the point; visible ones only if asked for.  Times that differ by rounding
+   only are one, the latest of them. */
 static double next_time(Engine *engine, const Point *point, bool visible, bool internal)
 {
     const Model *m = engine->model;
-    double next = INFINITY;
-    for (size_t j = 0; j < m->n_jumps; j++) {
-        const ModelJump *entry = &m->jumps[j];
-        if (entry->kind == JUMP_ON_TIME && (entry->internal ? internal : visible) &&
-            engine->times[entry->index] > *point->time)
-            next = fmin(next, engine->times[entry->index]);
-    }
-    return next;
+    double first = INFINITY, next = -INFINITY;
+    for (int round = 0; round < 2; round++)
+        for (size_t j = 0; j < m->n_jumps; j++) {
+            const ModelJump *entry = &m->jumps[j];
+            double time = engine->times[entry->index];
+            if (entry->kind != JUMP_ON_TIME || !(entry->internal ? internal : visible) || !(time > *point->time))
+                continue;
+            if (round == 0)
+                first = fmin(first, time);
+            else if (time <= first + TIME_ROUNDING_ULPS * time_ulp(first))
+                next = fmax(next, time);
+        }
+    return isfinite(next) ? next : first;
 }
 
 /* Flows to `limit` or to the end of a piece without time events, or to the first guard crossing on it.
@@ -49,6 +55,25 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
     return FLOW_REACHED;
 }
 
+/* Takes a guard that is crossed within the tolerance before a time event to that event's instant, where
+   the order of the table decides and not rounding. */
+static FlowEnd go_on_to(Engine *engine, const Point *point, double time_event, size_t *budget)
+{
+    const Model *m = engine->model;
+    double *enabled = engine->enabled;
+    if (!evaluate_margins(engine, *point->time, point->x, point->z))
+        return FLOW_PROBLEM;
+    for (size_t i = 0; i < m->n_margins; i++)
+        enabled[i] = engine->margins[i] >= point->level[i] ? 1.0 : 0.0;
+    FlowEnd result = flow_piece(engine, point, time_event, time_event, false, budget);
+    if (result != FLOW_REACHED || !evaluate_margins(engine, *point->time, point->x, point->z))
+        return result == FLOW_REACHED ? FLOW_PROBLEM : result;
+    for (size_t i = 0; i < m->n_margins; i++)
+        if (enabled[i] > 0.0)
+            point->level[i] = fmin(0.0, engine->margins[i]);
+    return FLOW_REACHED;
+}
+
 /* Flows to `limit` through the breakpoints on the way; with `locate` it stops at the first visible event. */
 static FlowEnd flow(Engine *engine, const Point *point, double limit, bool locate, size_t *budget)
 {
@@ -62,6 +87,9 @@ static FlowEnd flow(Engine *engine, const Point *point, double limit, bool locat
             return FLOW_REACHED;
         double piece_end = next_time(engine, point, locate, true);
         FlowEnd result = flow_piece(engine, point, limit, piece_end, locate, budget);
+        bool near = piece_end <= limit && piece_end - *point->time <= event_tolerance(piece_end);
+        if (result == FLOW_EVENT && near && *point->time < piece_end)
+            result = go_on_to(engine, point, piece_end, budget);
         /* At an event the loop begins anew: a breakpoint of the same instant may come before it. */
         if (result != FLOW_REACHED && result != FLOW_EVENT)
             return result;
@@ -89,8 +117,9 @@ bool engine_predict(Engine *engine, double limit, double *event_time)
     bool renew = end == FLOW_BUDGET || (end == FLOW_REACHED && limit > horizon);
     /* A problem ahead is reported when its time is reached; it may never be, if an input changes. */
     status->prediction = end == FLOW_EVENT ? PREDICTION_EVENT : renew ? PREDICTION_RENEWAL : PREDICTION_QUIET;
+    /* Without an event ahead the limit is announced, where nothing happens: that too is knowledge. */
     *event_time = *engine->predicted.time;
-    return status->prediction != PREDICTION_QUIET;
+    return *event_time > now;
 }
 
 bool engine_next_time_event(Engine *engine, double *event_time)

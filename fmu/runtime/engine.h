@@ -71,8 +71,9 @@ bool engine_jump(Engine *engine, bool *states_changed);
 bool engine_jump_all(Engine *engine);
 Advance engine_advance(Engine *engine, double target, EventPolicy policy);
 
-/* Looks ahead to the next visible event, at most to `limit` (may be infinite); true and its time
-   if there is one.  The state at the event is kept, and engine_advance takes it from there. */
+/* Looks ahead to the next visible event, at most to `limit` (may be infinite); its time, or that of
+   the limit if nothing happens before.  False if that is not ahead.  The state there is kept, and
+   engine_advance takes it from there. */
 bool engine_predict(Engine *engine, double limit, double *event_time);
 /* The earliest visible time event after now. */
 bool engine_next_time_event(Engine *engine, double *event_time);

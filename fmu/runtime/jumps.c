@@ -66,12 +66,18 @@ bool evaluate_times(Engine *engine, const Point *point)
     return true;
 }
 
+static size_t time_jumps_allowed(const Engine *engine)
+{
+    return JUMPS_AT_ONE_TIME * engine->model->n_times;
+}
+
 static bool stuck_in_time(Engine *engine, size_t jump, double t)
 {
-    return problem(engine, ENDED_FAILED,
-                   "The time event '%s' was taken %d times at t = %.17g s and is due again; its next time must lie "
-                   "after the present one. Remedy: let its jump map move the time on by more than rounding.",
-                   engine->model->jumps[jump].name, TIME_EVENT_REPEATS, t);
+    return problem(engine, ENDED_ZENO,
+                   "Zeno: time events, the last of them '%s', were taken more than %zu times at t = %.17g s; the next "
+                   "time must lie after the present one. Remedy: let the jump map move the time on past it, or start "
+                   "with the next time to come.",
+                   engine->model->jumps[jump].name, time_jumps_allowed(engine), t);
 }
 
 /* The first breakpoint of the flow that is due, n_jumps if there is none. */
@@ -100,7 +106,7 @@ bool take_internal_jumps(Engine *engine, const Point *point)
             return false;
         if (visible < internal)
             return true;
-        if (repeats == TIME_EVENT_REPEATS)
+        if (repeats == time_jumps_allowed(engine))
             return stuck_in_time(engine, internal, *point->time);
         if (!apply_reset(engine, internal, point))
             return false;
@@ -117,13 +123,14 @@ static bool flow_is_over(Engine *engine, const Point *point, bool *over)
         return true;
     if (!evaluate_flow_set(engine, *point->time, point->x, point->z, &margin))
         return false;
-    *over = margin < 0.0;
-    if (margin != 0.0)
+    *over = margin < -EVENT_TOLERANCE;
+    /* On the border, up to rounding, it depends on where the flow leads. */
+    if (*over || margin > 0.0)
         return true;
     if (!step_begin(engine, point) || !step_probe(engine, point, soon) ||
         !evaluate_flow_set(engine, soon, engine->probe_x, point->z, &later))
         return false;
-    *over = later < 0.0;
+    *over = later < margin;
     return true;
 }
 
@@ -170,7 +177,7 @@ static bool count_jump(Engine *engine, size_t jump)
     }
     status->jumps_taken++;
     if (engine->model->jumps[jump].kind == JUMP_ON_TIME)
-        return ++status->time_jumps_there <= TIME_EVENT_REPEATS || stuck_in_time(engine, jump, t);
+        return ++status->time_jumps_there <= time_jumps_allowed(engine) || stuck_in_time(engine, jump, t);
     return zeno_record(engine, jump);
 }
 

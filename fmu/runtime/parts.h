@@ -14,6 +14,8 @@
 /* Guards that cross within this time (s) are simultaneous.  A state outside the flow set by less
    than this (in units of the margin), or that is back inside within this time, counts as inside. */
 #define EVENT_TOLERANCE 1e-9
+/* Time events closer than this differ by rounding: 3 * 0.1 and 0.3 are one time. */
+#define TIME_ROUNDING_ULPS 8.0
 /* Width (s) to which a crossing is located, never less than 2 ulp of the time: the shortest probe is half of it. */
 #define LOCATION_TOLERANCE 1e-16
 #define RELATIVE_TOLERANCE 1e-13
@@ -21,7 +23,8 @@
 #define LOOK_AHEAD_STEPS 20000
 #define LOOK_AHEAD_TIME 1e6
 #define ADVANCE_STEPS 1000000
-#define TIME_EVENT_REPEATS 1000000
+/* Jumps at one instant: of each jump on the state, and of the time events together, times their number. */
+#define JUMPS_AT_ONE_TIME 1000
 
 /* A point of the run.  time, step, x, z and level lie one after the other in memory, so one copy
    moves them all; step is the solver's proposal for the next step, 0 when there is none.  level is
@@ -88,7 +91,7 @@ struct Engine {
     double *w;
     Step step;
     double *probe_k[N_STAGES], *probe_x, *dense_x;
-    double *margins, *times, *samples, *outputs;
+    double *margins, *enabled, *times, *samples, *outputs;
     unsigned char *is_guard;      /* of each margin: some jump waits for it */
     Point reset, shown;           /* result of a reset map; what a view shows */
     View view;

@@ -9,10 +9,9 @@
 #include "parts.h"
 
 #define N_GAPS 8                  /* gaps that must look geometric */
-#define LARGEST_RATIO 0.999
 #define RATIO_SPREAD 0.05
-#define REST_TOLERANCE 1e-6       /* s, times max(1, |t|) */
-#define JUMPS_AT_ONE_TIME 1000
+#define REST_TOLERANCE 1e-6       /* s */
+#define RESOLVED_ULPS 1e4         /* a rest below so many ulp of the time is not resolved any more */
 #define BURST_JUMPS 100
 #define BURST_TIME 1e-6           /* s */
 
@@ -48,7 +47,7 @@ static bool shrinking(const JumpHistory *history, double *gap, double *ratio)
         least = fmin(least, *ratio);
         greatest = fmax(greatest, *ratio);
     }
-    return greatest < LARGEST_RATIO && greatest - least < RATIO_SPREAD * greatest;
+    return greatest < 1.0 && greatest - least <= RATIO_SPREAD * *ratio;
 }
 
 bool zeno_record(Engine *engine, size_t jump)
@@ -66,7 +65,7 @@ bool zeno_record(Engine *engine, size_t jump)
                        at_once, name, t);
     if (shrinking(history, &gap, &ratio)) {
         double rest = gap * ratio / (1.0 - ratio);
-        if (rest < REST_TOLERANCE * fmax(1.0, fabs(t)))
+        if (rest <= fmax(REST_TOLERANCE, RESOLVED_ULPS * time_ulp(t)))
             return problem(engine, ENDED_ZENO,
                            "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "
                            "ratio %.3f). Remedy: end the run before that time, or give the jump set a minimum dwell "

