@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
+
 import numpy as np
 
 import hybrid_model as hm
@@ -42,9 +44,9 @@ class EventGenerator(hm.HybridAutomaton):
     threshold = hm.Parameter(0.5, description="trigger threshold c")
     broadcast_clock = hm.Clock("broadcast", description="ticks with each broadcast")
 
+    @abstractmethod
     def threshold_now(self, s: hm.Values) -> Value:
         """The threshold that the error is compared with."""
-        raise NotImplementedError(f"{type(self).__name__} must say what its threshold is")
 
     def start_map(self, s: hm.Values) -> dict[str, Value]:
         """The first broadcast."""
