@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from oracles.exact_consensus import exact_run
 
 import hybrid_model as hm
-from cosim.consensus import in_process_system, network_report
+from cosim.consensus import fmu_system, in_process_system, network_report
 from cosim.masters import run_event_exact
-from hybrid_model.consensus.network import closed_loop
+from hybrid_model.consensus.network import closed_loop, scenario_agents
 from hybrid_model.consensus.report import run_report
 from hybrid_model.consensus.scenario import load_scenario, read_scenario
 
@@ -61,8 +61,8 @@ def two_agents(**weights):
     )
 
 
-@pytest.mark.parametrize("run", ["one automaton", "network"])
-def test_symmetric_agents_broadcast_together(run):
+@pytest.mark.parametrize("run", ["one automaton", "network", "FMUs"])
+def test_symmetric_agents_broadcast_together(run, exported):
     """Both errors reach the threshold at 10 s up to rounding; the gap is then 0.5/0.95 s (audit, section 6).
 
     If rounding let one of them fire first, the other's error would turn back and the next event come at 11.1 s.
@@ -70,6 +70,9 @@ def test_symmetric_agents_broadcast_together(run):
     scenario = two_agents(kind="constant", value=1.0)
     if run == "network":
         report = network_report(scenario, run_event_exact(in_process_system(scenario), scenario.stop_time))
+    elif run == "FMUs":
+        fmus = {name: exported(agent, f"two_{name}") for name, agent in scenario_agents(scenario).items()}
+        report = network_report(scenario, run_event_exact(fmu_system(scenario, fmus), scenario.stop_time))
     else:
         report = run_report(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time))
     expected = np.array([10.0, 10.0 + 0.5 / 0.95, 20.0 + 0.5 / 0.95, 20.0 + 1.0 / 0.95])
