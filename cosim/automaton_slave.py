@@ -188,7 +188,8 @@ class AutomatonSlave(Slave):
             return None
         if self._ahead is None:
             self._ahead = Lookahead.from_run(self._running, self._t_stop)
-        return self._ahead.end.t
+        # A run that ends where it is has no time to announce; the next step says why it ends.
+        return self._ahead.end.t if self._ahead.end.t > self._running.t else None
 
 
 def _termination(run: Execution) -> Termination | None:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from hybrid_model.errors import DeclarationError
 from hybrid_model.flow import FlowPiece
 from hybrid_model.layout import Layout
-from hybrid_model.variables import FloatArray, Kind, Values, Variable, element_names, unknown_name
+from hybrid_model.variables import FloatArray, Kind, Values, Variable, unknown_name
 
 if TYPE_CHECKING:
     from hybrid_model.execution import Execution, JumpRecord
@@ -80,6 +80,7 @@ class HybridArc:
         self.event_tolerance = execution.solver.event_tolerance
         self.jumps = jumps
         self._flows = list(flows)
+        self._starts, self._ends = [flow.t0 for flow in flows], [flow.t1 for flow in flows]
         self._layout = Layout(self.automaton)
         self._inputs = execution.inputs
         self._p = execution.p
@@ -157,10 +158,6 @@ class HybridArc:
         flow = self._flows[-1]
         return self._values(flow.t1, flow.at(flow.t1), flow.z)
 
-    def scalar_names(self, name: str) -> list[str]:
-        """Return the names of a variable's elements: ``x``, or ``w[1]``, ``w[2]``."""
-        return element_names(self._variable(name))
-
     def _variable(self, name: str) -> Variable:
         known = {variable.name: variable for variable in self.automaton.variables}
         if name not in known:
@@ -168,10 +165,7 @@ class HybridArc:
         return known[name]
 
     def _flow_at(self, t: float, before: bool) -> FlowRecord:
-        if before:
-            at = bisect.bisect_left([flow.t1 for flow in self._flows], t)
-        else:
-            at = bisect.bisect_right([flow.t0 for flow in self._flows], t) - 1
+        at = bisect.bisect_left(self._ends, t) if before else bisect.bisect_right(self._starts, t) - 1
         return self._flows[min(max(at, 0), len(self._flows) - 1)]
 
     def _values(self, t: float, x: FloatArray, z: FloatArray) -> Values:

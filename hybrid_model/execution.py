@@ -181,7 +181,7 @@ class Execution:
         if on_state:
             self.levels = self.levels.copy()
             self.levels[self._number_of_guard(index)] = 0.0
-        if not on_state:
+        else:
             self._require_progress(index, before)
         message = self.monitor.record(self.automaton.name, info.name, self.t, on_state=on_state)
         if message:
@@ -319,9 +319,9 @@ class Execution:
             raise SimulationError(f"{self.automaton.name}: {bad} {when}: states must stay finite numbers.")
 
     def _require_whole(self, when: str) -> None:
-        whole = self._whole & (self.z != np.round(self.z))
-        if np.any(whole):
-            k = int(np.argmax(whole))
+        fractions = self._whole & (self.z != np.round(self.z))
+        if np.any(fractions):
+            k = int(np.argmax(fractions))
             raise SimulationError(
                 f"{self.automaton.name}: {self.layout.names(Kind.DISCRETE)[k]} = {self.z[k]:.9g} {when}: it is "
                 "declared integer and must stay a whole number."

@@ -132,13 +132,6 @@ def test_unknown_names_are_refused(ball, times):
         ball.at("x", times)
     with pytest.raises(hm.DeclarationError, match="no variable 'x'"):
         ball["x"]
-    with pytest.raises(hm.DeclarationError, match="no variable 'x'"):
-        ball.scalar_names("x")
-
-
-def test_scalar_names():
-    arc = hm.simulate(Mixed(), 0.1)
-    assert (arc.scalar_names("w"), arc.scalar_names("u")) == (["w[1]", "w[2]"], ["u"])
 
 
 def test_the_text_of_an_arc_tells_what_ran_and_how_it_ended(ball):

@@ -53,7 +53,7 @@ def run_event_exact(
     """
     require_times(t_start, t_stop, output_interval, "output interval")
     _require_discrete(system)
-    run = _Run(system, t_start, t_stop)
+    run = _Run(system, t_start)
     try:
         start_slaves(system, t_start, t_stop, events=True)
         run.handle_events(t_start, set(system.slaves))
@@ -103,10 +103,9 @@ class _Block:
 class _Run:
     """The queue of predicted events, and the event iteration at one instant."""
 
-    def __init__(self, system: System, t_start: float, t_stop: float) -> None:
+    def __init__(self, system: System, t_start: float) -> None:
         self.system = system
         self.result = CosimResult(t=t_start)
-        self.t_stop = t_stop
         self.blocks = {name: _Block(slave, k, t_start) for k, (name, slave) in enumerate(system.slaves.items())}
         self._queue: list[tuple[float, int, int, str]] = []
 

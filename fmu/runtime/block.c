@@ -59,11 +59,6 @@ const char *describe_state(const Engine *engine, const double *x, const double *
     return text;
 }
 
-Ending engine_ending(const Engine *engine)
-{
-    return (Ending)engine->status->ending;
-}
-
 const char *engine_message(const Engine *engine)
 {
     return engine->status->message;

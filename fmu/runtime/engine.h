@@ -27,7 +27,7 @@ typedef enum {
     ADVANCE_REACHED,            /* at the target, nothing pending */
     ADVANCE_EVENT_AT_TARGET,    /* at the target, an event pending */
     ADVANCE_EVENT_BEFORE,       /* at an event before the target */
-    ADVANCE_ENDED               /* the run is over: see engine_ending, engine_message */
+    ADVANCE_ENDED               /* the run is over: see engine_message */
 } Advance;
 
 /* What a reader is shown. */
@@ -84,7 +84,6 @@ void engine_clear_ticks(Engine *engine);
 /* Visible jumps taken in the last engine_advance. */
 size_t engine_jumps_taken(const Engine *engine);
 
-Ending engine_ending(const Engine *engine);
 /* Why the run ended: a sentence with the time, the values and the remedy. */
 const char *engine_message(const Engine *engine);
 /* Why the last call that failed did so, also when the run is not over. */

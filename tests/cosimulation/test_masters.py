@@ -8,6 +8,7 @@ import pytest
 import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.errors import CosimError
+from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import Ended
 from cosim.slave import Step, Update
@@ -224,3 +225,24 @@ def test_a_restored_slave_counts_jumps_from_where_it_was_saved():
     for _ in range(3):
         slave.restore(saved)
         assert run_on(slave) == first
+
+
+class Stuck(hm.HybridAutomaton):
+    """Begins outside its flow set, with no jump to take."""
+
+    x = hm.State(-1.0, output=True)
+
+    def flow_map(self, s):
+        return {"x": 1.0}
+
+    def flow_set(self, s):
+        return s.x
+
+
+@pytest.mark.parametrize("kind", [AutomatonSlave, FmuSlave])
+def test_a_block_that_cannot_begin_ends_the_run_with_its_own_words(kind, exported):
+    slave = kind("stuck", Stuck() if kind is AutomatonSlave else exported(Stuck(), "stuck"))
+    result = run_event_exact(System([slave], {}), 1.0)
+    assert result.ended is Ended.TERMINATED
+    assert "x = -1" in result.message
+    assert result.t == 0.0
