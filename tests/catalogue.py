@@ -40,6 +40,7 @@ def cases():
             edges.PeriodicSwitching(dwell=0.7, active=[[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], raw=[2.0, 3.0]), 5.0
         ),
     }
+    found |= process_cases()
     for kind in ("static", "dynamic"):
         scenario = replace_trigger(paper, kind)
         found[f"paper_{kind}"] = Case(closed_loop(scenario), 20.0)
@@ -49,3 +50,25 @@ def cases():
             {"neighbours[1]": ((2.0, 1.3), (7.5, 0.9)), "neighbours[2]": ((3.0, 0.6), (11.0, 1.0))},
         )
     return found
+
+
+def process_cases():
+    """Processes, power electronics, and the examples of the HyEQ Toolbox; ends are not points of events."""
+    models = hm.models
+    return {
+        "two_tank": Case(models.TwoTank(), 3.99),
+        "relay_hysteresis": Case(models.RelayHysteresis(x=0.3, v=-0.2), 15.0),
+        "boost_converter": Case(models.BoostConverter(), 1.03e-3),
+        "boost_converter_discontinuous": Case(models.BoostConverter(load=500.0, voltage=70.0), 1.03e-3),
+        "vehicle_on_path": Case(models.VehicleOnPath(), 15.0, {"speed": ((2.0, 1.5), (7.3, 0.8))}),
+        "two_gene_network": Case(models.TwoGeneNetwork(), 10.0),
+        "analog_digital_loop": Case(models.AnalogDigitalLoop(low=0.37, high=0.61, period=0.13, latency=0.05), 4.0),
+        "finite_state_machine": Case(
+            models.FiniteStateMachine(table=[[1, 0, 2], [1, 2, 2], [0, 0, 2]], symbol=1.0),
+            6.0,
+            {"symbol": ((1.0, 0.0), (2.0, 1.0), (3.0, 0.0), (4.0, 2.0), (5.0, 1.0))},
+        ),
+        "network_estimation": Case(models.NetworkEstimation(), 12.0),
+        "switched_feedback": Case(models.SwitchedFeedback(), 20.0),
+        "juggled_ball": Case(models.JuggledBall(), 12.0),
+    }

@@ -1,6 +1,51 @@
 """Model library: small automata with known answers."""
 
+from hybrid_model.models.analog_digital import (
+    AnalogDigitalConverter,
+    AnalogDigitalLoop,
+    FiniteStateMachine,
+    FirstOrderPlant,
+    ZeroOrderHold,
+)
+from hybrid_model.models.boost_converter import BoostConverter
 from hybrid_model.models.bouncing_ball import BouncingBall
+from hybrid_model.models.juggled_ball import JuggledBall, PeriodController, PushedBall
+from hybrid_model.models.network_estimation import (
+    LinearProcess,
+    NetworkEstimation,
+    SineSource,
+    SporadicEstimator,
+    SporadicNetwork,
+)
+from hybrid_model.models.relay_hysteresis import RelayHysteresis
+from hybrid_model.models.switched_feedback import NormSwitch, StaticFeedback, SwitchedFeedback
 from hybrid_model.models.thermostat import Thermostat
+from hybrid_model.models.two_gene_network import TwoGeneNetwork
+from hybrid_model.models.two_tank import TwoTank
+from hybrid_model.models.vehicle_on_path import VehicleOnPath
 
-__all__ = ["BouncingBall", "Thermostat"]
+__all__ = [
+    "AnalogDigitalConverter",
+    "AnalogDigitalLoop",
+    "BoostConverter",
+    "BouncingBall",
+    "FiniteStateMachine",
+    "FirstOrderPlant",
+    "JuggledBall",
+    "LinearProcess",
+    "NetworkEstimation",
+    "NormSwitch",
+    "PeriodController",
+    "PushedBall",
+    "RelayHysteresis",
+    "SineSource",
+    "SporadicEstimator",
+    "SporadicNetwork",
+    "StaticFeedback",
+    "SwitchedFeedback",
+    "Thermostat",
+    "TwoGeneNetwork",
+    "TwoTank",
+    "VehicleOnPath",
+    "ZeroOrderHold",
+]
