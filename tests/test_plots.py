@@ -108,7 +108,7 @@ def test_an_unknown_jump_is_refused(ball, ax):
 
 def test_a_raster_has_a_row_a_name_with_the_first_on_top(ax):
     events = {"one": [0.1, 0.2], "two": [], "three": [0.3]}
-    assert plots.plot_raster(events, ax) is ax
+    assert plots.plot_raster(events, ax=ax) is ax
     assert [label.get_text() for label in ax.get_yticklabels()] == ["one", "two", "three"]
     assert ax.yaxis_inverted()
     assert [list(rows.get_positions()) for rows in ax.collections] == [[0.1, 0.2], [], [0.3]]

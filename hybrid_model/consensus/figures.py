@@ -18,12 +18,10 @@ from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound
 from hybrid_model.consensus.network import agent_name
 from hybrid_model.consensus.report import edge_norm
 from hybrid_model.consensus.scenario_data import Scenario
-from hybrid_model.plots import JOURNAL, curve, new_axes, plot_raster
+from hybrid_model.plots import COLORS, JOURNAL, curve, new_axes, plot_raster
 
 COLUMN = (3.4, 2.5)
 """Width and height in inches of a figure in one column of a journal."""
-COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000", "#999999")
-"""Colours that remain apart for colour-blind readers."""
 MARKER: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.2}
 """A broadcast in a figure over time."""
 
@@ -152,7 +150,7 @@ def plot_broadcasts(scenario: Scenario, event_times: Sequence[npt.ArrayLike], ax
             "give one row an agent."
         )
     rows = {f"agent {i}": np.asarray(times, dtype=float) for i, times in enumerate(event_times, start=1)}
-    ax = plot_raster(rows, ax)
+    ax = plot_raster(rows, ax=ax)
     for i, (collection, times) in enumerate(zip(ax.collections, rows.values(), strict=True), start=1):
         collection.set_color(_color(i))
         ax.text(1.02, i - 1, f"{len(times)}", transform=ax.get_yaxis_transform(), va="center", fontsize="small")

@@ -1,47 +1,18 @@
-"""Plots of runs on hybrid time: every function draws into the axes given, or into new ones, and returns them."""
+"""Variables over time as bare curves, for figures with markers of their own."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.typing import RcKeyType
 
 from hybrid_model.arc import HybridArc
+from hybrid_model.plots.style import TIME, new_axes
 from hybrid_model.variables import FloatArray
 
-JOURNAL: dict[RcKeyType, Any] = {
-    # STIX for text and formulas, so that both have one weight; it comes with matplotlib.
-    "font.family": "STIXGeneral",
-    "mathtext.fontset": "stix",
-    "font.size": 9,
-    "axes.labelsize": 9,
-    "legend.fontsize": 8,
-    "xtick.labelsize": 8,
-    "ytick.labelsize": 8,
-    "lines.linewidth": 1.0,
-    "axes.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "legend.frameon": False,
-    "figure.constrained_layout.use": True,
-    "savefig.dpi": 300,
-    "pdf.fonttype": 42,
-    # No creation date and no random identifiers: the same run gives the same file.
-    "svg.hashsalt": "hybrid-fmu",
-}
-"""Settings for ``matplotlib.rc_context``: a figure of one column of a journal."""
 POINTS = 400
 """Points of a curve over a whole run, beside those at jumps and at the solver's steps."""
-
-
-def new_axes(ax: Axes | None) -> Axes:
-    """Return `ax`, or new axes if there are none."""
-    return plt.subplots()[1] if ax is None else ax
 
 
 def curve(
@@ -94,7 +65,7 @@ def plot_flow(
     ax = new_axes(ax)
     for name in names:
         ax.plot(*curve(arc, name), label=(labels or {}).get(name, name))
-    ax.set_xlabel("time $t$ (s)")
+    ax.set_xlabel(TIME)
     ax.set_xlim(arc.t[0], arc.t[-1])
     return ax
 
@@ -117,25 +88,4 @@ def mark_jumps(arc: HybridArc, name: str, jump: str, ax: Axes, color: str = "k")
     """
     times = arc.event_times(jump)
     ax.plot(times, arc.at(name, times), linestyle="none", marker="o", markersize=2.5, color=color)
-    return ax
-
-
-def plot_raster(events: Mapping[str, npt.ArrayLike], ax: Axes | None = None) -> Axes:
-    """Draw the times of events, one row a name, the first on top.
-
-    Parameters
-    ----------
-    events : mapping
-        Name -> times in s.
-    ax : Axes, optional
-        Where to draw.
-    """
-    ax = new_axes(ax)
-    names = list(events)
-    ax.eventplot(
-        [np.asarray(events[name]) for name in names], lineoffsets=range(len(names)), linelengths=0.7, colors="k"
-    )
-    ax.set_yticks(range(len(names)), names)
-    ax.invert_yaxis()
-    ax.set_xlabel("time $t$ (s)")
     return ax

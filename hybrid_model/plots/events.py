@@ -1,0 +1,118 @@
+"""When jumps happen: a raster with a row for each name, and the times between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+
+from hybrid_model.arc import HybridArc
+from hybrid_model.errors import DeclarationError
+from hybrid_model.plots.style import TIME, legend, new_axes, short_names
+from hybrid_model.variables import FloatArray, unknown_name
+
+Events = HybridArc | Mapping[str, npt.ArrayLike]
+"""A run, or times in s by name, such as those of a co-simulation."""
+ROWS = 40
+"""So many rows of a raster have room for their names; of more rows some are named."""
+LEGEND_ROWS = 10
+"""With more names than these a legend could not tell them apart."""
+
+
+def plot_raster(events: Events, *names: str, ax: Axes | None = None, **line_options: Any) -> Axes:
+    """Draw the times of events, one row a name, the first on top.
+
+    Parameters
+    ----------
+    events : HybridArc or mapping
+        A run, whose jumps are drawn, or name -> times in s.
+    *names : str
+        Jumps, or keys of the mapping. Default: all; of a run those that are not internal.
+    ax : Axes, optional
+        Where to draw.
+    **line_options
+        As in ``Axes.eventplot``.
+
+    Raises
+    ------
+    DeclarationError
+        For an unknown name.
+    """
+    times = event_times(events, names)
+    ax = new_axes(ax)
+    rows = range(len(times))
+    options: dict[str, Any] = {"linelengths": 0.7, "colors": "k"} | line_options
+    if times:  # without rows eventplot has no limits to set
+        ax.eventplot(list(times.values()), lineoffsets=rows, **options)
+    labels, common = short_names(list(times))
+    step = max(1, math.ceil(len(times) / ROWS))
+    ax.set_yticks(rows[::step], labels[::step])
+    ax.set_ylim(len(times) - 0.5, -0.5)
+    ax.set_xlabel(TIME)
+    ax.set_ylabel(common)
+    return ax
+
+
+def plot_inter_event_times(
+    events: Events, *names: str, ax: Axes | None = None, bound: float | None = None, **line_options: Any
+) -> Axes:
+    """Draw the time since the last event of the same name, at every event, on a logarithmic axis.
+
+    Events at one instant are no point of such an axis: they are triangles at its lower end.
+
+    Parameters
+    ----------
+    events, *names, ax
+        As in `plot_raster`.
+    bound : float, optional
+        A lower bound in s, drawn as a dashed line.
+    **line_options
+        As in ``Axes.plot``.
+
+    Raises
+    ------
+    DeclarationError
+        For an unknown name, or a bound that is not positive.
+    """
+    if bound is not None and not (math.isfinite(bound) and bound > 0.0):
+        raise DeclarationError(
+            f"the bound on inter-event times is {bound!r} s, but a logarithmic axis shows positive numbers only: "
+            "give a positive one, or none."
+        )
+    times = event_times(events, names)
+    ax = new_axes(ax)
+    ax.set_yscale("log")
+    labels, common = short_names(list(times))
+    few = len(times) <= LEGEND_ROWS
+    options: dict[str, Any] = (
+        {"marker": "o", "markersize": 3.5, "linestyle": "none"} | ({} if few else {"color": "k"}) | line_options
+    )
+    for label, row in zip(labels, times.values(), strict=True):
+        gaps = np.diff(row)
+        apart = gaps > 0.0
+        (line,) = ax.plot(row[1:][apart], gaps[apart], **options | {"label": label if few else f"_{label}"})
+        together = row[1:][~apart]
+        if together.size:
+            bottom: dict[str, Any] = {"color": line.get_color(), "clip_on": False, "label": "_together"}
+            ax.plot(together, np.zeros(together.size), "v", transform=ax.get_xaxis_transform(), **bottom)
+    if bound is not None:
+        ax.axhline(bound, color="0.4", linestyle=(0, (5, 2)), linewidth=1.0, zorder=1.5, label="lower bound")
+    ax.set_xlabel(TIME)
+    ax.set_ylabel(f"time since the last {common or 'event'} (s)")
+    legend(ax)
+    return ax
+
+
+def event_times(events: Events, names: tuple[str, ...]) -> dict[str, FloatArray]:
+    """Return the times in s of events by name, see `plot_raster`."""
+    if isinstance(events, HybridArc):
+        chosen = names or tuple(info.name for info in events.automaton.jumps if not info.internal)
+        return {name: events.event_times(name) for name in chosen}
+    for name in names:
+        if name not in events:
+            raise DeclarationError(unknown_name("the mapping of events", name, events))
+    return {name: np.asarray(events[name], dtype=np.float64) for name in names or events}
