@@ -68,7 +68,7 @@ def process_cases():
             6.0,
             {"symbol": ((1.0, 0.0), (2.0, 1.0), (3.0, 0.0), (4.0, 2.0), (5.0, 1.0))},
         ),
-        "network_estimation": Case(models.NetworkEstimation(), 11.9),
+        "network_estimation": Case(models.NetworkEstimation(), 10.0),
         "switched_feedback": Case(models.SwitchedFeedback(), 20.0),
         "juggled_ball": Case(models.JuggledBall(), 12.0),
     }
