@@ -7,8 +7,10 @@ from hybrid_model.models.analog_digital import (
     FirstOrderPlant,
     ZeroOrderHold,
 )
+from hybrid_model.models.ball_on_moving_table import BallOnMovingTable, BallOnOscillatingTable, OscillatingTable
 from hybrid_model.models.boost_converter import BoostConverter
 from hybrid_model.models.bouncing_ball import BouncingBall
+from hybrid_model.models.fireflies import Fireflies, Firefly, FireflyNetwork
 from hybrid_model.models.juggled_ball import JuggledBall, PeriodController, PushedBall
 from hybrid_model.models.network_estimation import (
     LinearProcess,
@@ -17,7 +19,10 @@ from hybrid_model.models.network_estimation import (
     SporadicEstimator,
     SporadicNetwork,
 )
+from hybrid_model.models.newtons_cradle import NewtonsCradle
+from hybrid_model.models.particle_in_box import ParticleInBox
 from hybrid_model.models.relay_hysteresis import RelayHysteresis
+from hybrid_model.models.sawtooth_timer import SawtoothTimer, ScheduledSawtoothTimer
 from hybrid_model.models.switched_feedback import NormSwitch, StaticFeedback, SwitchedFeedback
 from hybrid_model.models.thermostat import Thermostat
 from hybrid_model.models.two_gene_network import TwoGeneNetwork
@@ -27,17 +32,27 @@ from hybrid_model.models.vehicle_on_path import VehicleOnPath
 __all__ = [
     "AnalogDigitalConverter",
     "AnalogDigitalLoop",
+    "BallOnMovingTable",
+    "BallOnOscillatingTable",
     "BoostConverter",
     "BouncingBall",
     "FiniteStateMachine",
+    "Fireflies",
+    "Firefly",
+    "FireflyNetwork",
     "FirstOrderPlant",
     "JuggledBall",
     "LinearProcess",
     "NetworkEstimation",
+    "NewtonsCradle",
     "NormSwitch",
+    "OscillatingTable",
+    "ParticleInBox",
     "PeriodController",
     "PushedBall",
     "RelayHysteresis",
+    "SawtoothTimer",
+    "ScheduledSawtoothTimer",
     "SineSource",
     "SporadicEstimator",
     "SporadicNetwork",
