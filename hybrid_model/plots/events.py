@@ -19,6 +19,8 @@ Events = HybridArc | Mapping[str, npt.ArrayLike]
 """A run, or times in s by name, such as those of a co-simulation."""
 ROWS = 40
 """So many rows of a raster have room for their names; of more rows some are named."""
+MARKERS = "os^D<>pX"
+ONE_INSTANT = "at one instant"
 LEGEND_ROWS = 10
 """With more names than these a legend could not tell them apart."""
 
@@ -45,7 +47,7 @@ def plot_raster(events: Events, *names: str, ax: Axes | None = None, **line_opti
     times = event_times(events, names)
     ax = new_axes(ax)
     rows = range(len(times))
-    options: dict[str, Any] = {"linelengths": 0.7, "colors": "k"} | line_options
+    options: dict[str, Any] = {"linelengths": 0.7, "linewidths": 1.0, "colors": "k"} | line_options
     if times:  # without rows eventplot has no limits to set
         ax.eventplot(list(times.values()), lineoffsets=rows, **options)
     labels, common = short_names(list(times))
@@ -88,23 +90,32 @@ def plot_inter_event_times(
     ax.set_yscale("log")
     labels, common = short_names(list(times))
     few = len(times) <= LEGEND_ROWS
-    options: dict[str, Any] = (
-        {"marker": "o", "markersize": 3.5, "linestyle": "none"} | ({} if few else {"color": "k"}) | line_options
-    )
-    for label, row in zip(labels, times.values(), strict=True):
-        gaps = np.diff(row)
-        apart = gaps > 0.0
-        (line,) = ax.plot(row[1:][apart], gaps[apart], **options | {"label": label if few else f"_{label}"})
-        together = row[1:][~apart]
-        if together.size:
-            bottom: dict[str, Any] = {"color": line.get_color(), "clip_on": False, "label": "_together"}
-            ax.plot(together, np.zeros(together.size), "v", transform=ax.get_xaxis_transform(), **bottom)
+    for k, (label, row) in enumerate(zip(labels, times.values(), strict=True)):
+        own = {"label": label, "marker": MARKERS[k % len(MARKERS)]} if few else {"label": "_", "color": "k"}
+        _draw_gaps(ax, row, {"marker": "o", "markersize": 4, "linestyle": "none"} | own | line_options)
     if bound is not None:
         ax.axhline(bound, color="0.4", linestyle=(0, (5, 2)), linewidth=1.0, zorder=1.5, label="lower bound")
     ax.set_xlabel(TIME)
     ax.set_ylabel(f"time since the last {common or 'event'} (s)")
     legend(ax)
     return ax
+
+
+def _draw_gaps(ax: Axes, times: FloatArray, options: dict[str, Any]) -> None:
+    gaps = np.diff(times)
+    apart = gaps > 0.0
+    (line,) = ax.plot(times[1:][apart], gaps[apart], **options)
+    if apart.any():
+        # Room of a factor of three: gaps that are equal up to rounding must not fill the axis with their last digits.
+        room = np.array([[times[1], gaps[apart].min() / 3.0], [times[1], gaps[apart].max() * 3.0]])
+        ax.update_datalim(room, updatex=False)
+        ax.autoscale_view()
+    together = times[1:][~apart]
+    if together.size:
+        first = ONE_INSTANT not in ax.get_legend_handles_labels()[1]
+        bottom: dict[str, Any] = {"marker": "v", "linestyle": "none", "color": line.get_color(), "clip_on": False}
+        label = ONE_INSTANT if first else f"_{ONE_INSTANT}"
+        ax.plot(together, np.zeros(together.size), transform=ax.get_xaxis_transform(), label=label, **bottom)
 
 
 def event_times(events: Events, names: tuple[str, ...]) -> dict[str, FloatArray]:

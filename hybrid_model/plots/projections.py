@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from hybrid_model.arc import HybridArc
 from hybrid_model.plots.drawing import draw_arc, marked_jumps
-from hybrid_model.plots.style import JUMPS, TIME, add_label, legend, new_axes, with_unit
+from hybrid_model.plots.style import JUMPS, TIME, add_label, legend, new_axes, short_names, with_unit
 from hybrid_model.plots.trace import Scalar, Trace, find_scalar, find_scalars, jump_mask
 
 
@@ -135,7 +135,9 @@ def plot_hybrid_arc(
     draw_arc(ax, trace, [trace.t, trace.j.astype(float), values], marked, {"label": scalar.name} | line_options)
     ax.set_xlabel(TIME)
     ax.set_ylabel(JUMPS)
-    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.yaxis.set_major_locator(MaxNLocator(5, integer=True))
+    # The axes are short in projection: more numbers would run into each other.
+    ax.xaxis.set_major_locator(MaxNLocator(5))
     solid = cast(Any, ax)  # matplotlib ships no types of its three-dimensional axes
     solid.set_zlabel(add_label(solid.get_zlabel(), scalar.label))
     legend(ax)
@@ -186,22 +188,24 @@ def _plot_over(
     marks = [marked_jumps(trace, s, v, jumps) for s, v in zip(scalars, values, strict=True)]
     ax = new_axes(ax)
     horizontal = trace.j.astype(float) if over_jumps else trace.t
-    common = len({scalar.variable.unit for scalar in scalars}) == 1
-    for scalar, drawn, marked in zip(scalars, values, marks, strict=True):
-        label = scalar.name if common else scalar.label
+    labels, axis = _labels(scalars)
+    for label, drawn, marked in zip(labels, values, marks, strict=True):
         draw_arc(ax, trace, [horizontal, drawn], marked, {"label": label} | line_options)
     ax.set_xlabel(JUMPS if over_jumps else TIME)
     if over_jumps:
         ax.xaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set_ylabel(add_label(ax.get_ylabel(), _common_label(scalars) if common else ""))
+    ax.set_ylabel(add_label(ax.get_ylabel(), axis))
     legend(ax)
     return ax
 
 
-def _common_label(scalars: Sequence[Scalar]) -> str:
-    """Return the label of an axis for scalars of one unit: their names if they are few, else that of their variable."""
+def _labels(scalars: Sequence[Scalar]) -> tuple[list[str], str]:
+    """Return the names of curves in one pair of axes, and the label of their axis."""
+    if len({scalar.variable.unit for scalar in scalars}) > 1:
+        return [scalar.label for scalar in scalars], ""
     names = [scalar.name for scalar in scalars]
-    if len(names) > 3:
-        variables = {scalar.variable.name for scalar in scalars}
-        names = sorted(variables) if len(variables) == 1 else ["values"]
-    return with_unit(", ".join(names), scalars[0].variable.unit)
+    variables = {scalar.variable.name for scalar in scalars}
+    labels, common = short_names(names)
+    if not common and len(names) > 3:
+        common = variables.pop() if len(variables) == 1 else "values"
+    return labels, with_unit(common or ", ".join(names), scalars[0].variable.unit if scalars else "")
