@@ -1,10 +1,12 @@
 """Hybrid automata: declare them once, run them event-exactly, export and co-simulate them."""
 
 from hybrid_model.arc import HybridArc
+from hybrid_model.arc_file import load_arc
 from hybrid_model.automaton import Automaton, HybridAutomaton
 from hybrid_model.compose import Composition
 from hybrid_model.errors import (
     AlgebraicLoopError,
+    DataError,
     DeclarationError,
     HybridModelError,
     SimulationError,
@@ -12,6 +14,7 @@ from hybrid_model.errors import (
 )
 from hybrid_model.execution import Execution, JumpRecord
 from hybrid_model.margins import greatest, least
+from hybrid_model.samples import Samples
 from hybrid_model.signals import Signal
 from hybrid_model.simulate import simulate
 from hybrid_model.solver import Method, Solver
@@ -25,6 +28,7 @@ __all__ = [
     "Automaton",
     "Clock",
     "Composition",
+    "DataError",
     "DeclarationError",
     "Dimension",
     "DiscreteState",
@@ -39,6 +43,7 @@ __all__ = [
     "Output",
     "Parameter",
     "Priority",
+    "Samples",
     "Signal",
     "SimulationError",
     "Solver",
@@ -50,5 +55,6 @@ __all__ = [
     "ZenoGuard",
     "greatest",
     "least",
+    "load_arc",
     "simulate",
 ]

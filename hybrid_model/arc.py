@@ -3,56 +3,25 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from hybrid_model.arc_values import ArcValues, ComputedValues
+from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DeclarationError
-from hybrid_model.flow import FlowPiece
-from hybrid_model.layout import Layout
+from hybrid_model.flow_record import FlowRecord as FlowRecord
+from hybrid_model.samples import Samples
+from hybrid_model.stop import Stop
 from hybrid_model.variables import FloatArray, Kind, Values, Variable, unknown_name
 
 if TYPE_CHECKING:
     from hybrid_model.execution import Execution, JumpRecord
 
-
-@dataclass(frozen=True, eq=False)
-class FlowRecord:
-    """The flow between two jumps (of length zero in a cascade).
-
-    Attributes
-    ----------
-    t0 : float
-        Start in s.
-    x0, z : ndarray
-        Continuous states at the start; discrete states throughout.
-    pieces : tuple of FlowPiece
-        The solver's steps, in order.
-    """
-
-    t0: float
-    x0: FloatArray
-    z: FloatArray
-    pieces: tuple[FlowPiece, ...]
-
-    @property
-    def t1(self) -> float:
-        """End in s."""
-        return self.pieces[-1].t1 if self.pieces else self.t0
-
-    def extended(self, pieces: Sequence[FlowPiece]) -> FlowRecord:
-        """Return the flow with further steps."""
-        return replace(self, pieces=(*self.pieces, *pieces))
-
-    def at(self, t: float) -> FloatArray:
-        """Return the continuous states at `t` in [t0, t1]."""
-        if not self.pieces:
-            return self.x0
-        at = bisect.bisect_left([piece.t1 for piece in self.pieces], t)
-        return self.pieces[min(at, len(self.pieces) - 1)].at(t)
+Interval = tuple[float, float]
 
 
 class HybridArc:
@@ -65,28 +34,73 @@ class HybridArc:
     jumps : list of JumpRecord
         In order, with the states on both sides.
     stop : Stop
-        Why the run ended; its value is the remedy.
+        Why the run ended; its value is the remedy. A restricted arc keeps the reason of the whole run.
     message : str
         The particulars of the end, with names and numbers.
     event_tolerance : float
         Location tolerance of the run in s, see `Solver`.
+    automaton : Automaton
+        What ran. That of a loaded arc has names, variables and jumps, but no maps.
     """
 
     def __init__(self, execution: Execution, flows: Sequence[FlowRecord], jumps: list[JumpRecord]) -> None:
         assert execution.stopped is not None
-        self.automaton = execution.automaton
-        self.stop = execution.stopped
-        self.message = execution.message
-        self.event_tolerance = execution.solver.event_tolerance
-        self.jumps = jumps
+        read = ComputedValues(execution.automaton, execution.p, execution.inputs)
+        self._fill(read, flows, jumps, execution.stopped, execution.message, execution.solver.event_tolerance)
+
+    @classmethod
+    def recorded(
+        cls,
+        read: ArcValues,
+        flows: Sequence[FlowRecord],
+        jumps: Sequence[JumpRecord],
+        *,
+        stop: Stop,
+        message: str,
+        event_tolerance: float,
+        first_j: int = 0,
+    ) -> HybridArc:
+        """Make an arc from flows that are there already, such as those of a file.
+
+        Parameters
+        ----------
+        read : ArcValues
+            Reads variables off the flows.
+        flows : sequence of FlowRecord
+            In order; one more than jumps.
+        jumps : sequence of JumpRecord
+            Jump k leads from flow k to flow k + 1.
+        stop, message, event_tolerance
+            See `HybridArc`.
+        first_j : int
+            Jump count of the first flow.
+        """
+        arc = object.__new__(cls)
+        arc._fill(read, flows, jumps, stop, message, event_tolerance, first_j)
+        return arc
+
+    def _fill(
+        self,
+        read: ArcValues,
+        flows: Sequence[FlowRecord],
+        jumps: Sequence[JumpRecord],
+        stop: Stop,
+        message: str,
+        event_tolerance: float,
+        first_j: int = 0,
+    ) -> None:
+        self._read = read
         self._flows = list(flows)
+        self._first_j = first_j
+        self.automaton: Automaton = read.automaton
+        self.jumps = list(jumps)
+        self.stop = stop
+        self.message = message
+        self.event_tolerance = event_tolerance
         self._starts, self._ends = [flow.t0 for flow in flows], [flow.t1 for flow in flows]
-        self._layout = Layout(self.automaton)
-        self._inputs = execution.inputs
-        self._p = execution.p
-        times = [[flow.t0, *(piece.t1 for piece in flow.pieces)] for flow in self._flows]
+        times = [[t for t, _ in flow.points] for flow in self._flows]
         self.t: FloatArray = np.concatenate([np.array(row) for row in times])
-        self.j = np.concatenate([np.full(len(row), j) for j, row in enumerate(times)])
+        self.j = np.concatenate([np.full(len(row), first_j + k) for k, row in enumerate(times)])
 
     def __repr__(self) -> str:
         return (
@@ -96,13 +110,21 @@ class HybridArc:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a variable's samples, shape (n, *shape): a state, input, parameter or output."""
-        rows = []
-        for flow in self._flows:
-            points = [(flow.t0, flow.x0), *((piece.t1, piece.x1) for piece in flow.pieces)]
-            rows += [self._value(name, t, x, flow.z) for t, x in points]
-        return np.array(rows, dtype=np.float64)
+        shape = self._read.variable(name).shape
+        rows = [self._read.value(name, t, x, flow.z) for flow in self._flows for t, x in flow.points]
+        return np.array(rows, dtype=np.float64).reshape(len(self.t), *shape)
 
-    def at(self, name: str, t: npt.ArrayLike, *, before: bool = False) -> FloatArray:
+    def variable(self, name: str) -> Variable:
+        """Return the declaration of a variable: its unit, description, shape.
+
+        Raises
+        ------
+        DeclarationError
+            For an unknown name.
+        """
+        return self._read.variable(name)
+
+    def at(self, name: str, t: npt.ArrayLike, *, before: bool = False, j: npt.ArrayLike | None = None) -> FloatArray:
         """Return a variable at given times, interpolated by the solver's dense output.
 
         Parameters
@@ -112,30 +134,132 @@ class HybridArc:
         t : float or array_like
             Times in s within the run.
         before : bool
-            At the time of a jump return the value before it; default: after the last jump at that time.
+            At the time of a jump return the value before it (in a cascade, before the first); default: after the last
+            jump at that time.
+        j : int or array_like, optional
+            Jump counts: the value at hybrid time (t, j), so that every side of every jump of a cascade can be had.
 
         Returns
         -------
         ndarray
-            Shape of `t` followed by the variable's shape.
+            Shape of `t` (with `j`: what both broadcast to) followed by the variable's shape.
+
+        Raises
+        ------
+        DeclarationError
+            For an unknown name or a hybrid time outside the run.
+        """
+        shape = self.variable(name).shape
+        times = np.asarray(t, dtype=np.float64)
+        if j is None:
+            self._require_inside(times)
+            flows = [self._flow_at(float(time), before) for time in times.ravel()]
+        else:
+            times, counts = np.broadcast_arrays(times, np.asarray(j))
+            flows = [
+                self._flow_on(float(time), count) for time, count in zip(times.ravel(), counts.ravel(), strict=True)
+            ]
+        values = [
+            self._read.value(name, float(time), flow.at(float(time)), flow.z)
+            for time, flow in zip(times.ravel(), flows, strict=True)
+        ]
+        return np.array(values, dtype=np.float64).reshape(times.shape + shape)
+
+    # Parts of a run.
+
+    def restrict(self, *, t: Interval | None = None, j: Interval | None = None) -> HybridArc:
+        """Return the part of the run in an interval of t, of j, or of both, on the same hybrid time.
+
+        Parameters
+        ----------
+        t : (float, float), optional
+            Closed interval in s: jumps at its ends belong to it with both sides. Flows are cut by their dense output.
+        j : (int, int), optional
+            First and last jump count kept: flows number `j[0]` to `j[1]` and the jumps between them.
+
+        Returns
+        -------
+        HybridArc
+            With the jump counts of the whole run, and its `stop` and `message`.
+
+        Raises
+        ------
+        DeclarationError
+            For an interval whose end is not at or after its start, or in which nothing of the run lies.
+        """
+        a, b = _interval("t", t)
+        first, last = _interval("j", j)
+        kept = [
+            k
+            for k, flow in enumerate(self._flows)
+            if first <= self._first_j + k <= last and flow.t1 >= a and flow.t0 <= b
+        ]
+        if not kept:
+            raise DeclarationError(
+                f"nothing of the run lies in t = [{a:g}, {b:g}] s and j = [{first:g}, {last:g}]: it covers "
+                f"t = [{self.t[0]:g}, {self.t[-1]:g}] s and j = [{self.j[0]}, {self.j[-1]}]."
+            )
+        return HybridArc.recorded(
+            self._read,
+            [self._flows[k].cut(a, b) for k in kept],
+            self.jumps[kept[0] : kept[-1]],
+            stop=self.stop,
+            message=self.message,
+            event_tolerance=self.event_tolerance,
+            first_j=self._first_j + kept[0],
+        )
+
+    def resample(self, grid: npt.ArrayLike, names: Iterable[str] | None = None, *, both_sides: bool = False) -> Samples:
+        """Return variables at given times.
+
+        Parameters
+        ----------
+        grid : array_like, shape (n,)
+            Times in s within the run.
+        names : iterable of str, optional
+            Which variables; default: all but the parameters.
+        both_sides : bool
+            Whether a time at which the run jumps gives two rows, before its first and after its last jump there;
+            default: one row, after the last.
+
+        Returns
+        -------
+        Samples
+            With the jump count of every row.
 
         Raises
         ------
         DeclarationError
             For an unknown name or a time outside the run.
         """
-        times = np.atleast_1d(np.asarray(t, dtype=np.float64))
-        # Written so that a time that is not a number is outside as well.
-        if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
-            raise DeclarationError(
-                f"a time in [{times.min():g}, {times.max():g}] s lies outside the run, "
-                f"which covers [{self.t[0]:g}, {self.t[-1]:g}] s."
-            )
-        values = []
-        for time in times.ravel():
-            flow = self._flow_at(float(time), before)
-            values.append(self._value(name, float(time), flow.at(float(time)), flow.z))
-        return np.array(values, dtype=np.float64).reshape(np.shape(t) + self._variable(name).shape)
+        times = np.atleast_1d(np.asarray(grid, dtype=np.float64))
+        self._require_inside(times)
+        after = np.searchsorted(self._starts, times, side="right") - 1
+        if both_sides:
+            before = np.minimum(np.searchsorted(self._ends, times, side="left"), after)
+            rows = np.where(before < after, 2, 1)
+            times, number = np.repeat(times, rows), np.repeat(after, rows)
+            # The first of two rows.
+            firsts = np.cumsum(rows) - rows
+            number[firsts] = before
+        else:
+            number = after
+        points = [(float(t), self._flows[k]) for t, k in zip(times, number, strict=True)]
+        values = self._table(names, [(t, flow.at(t), flow.z) for t, flow in points])
+        return Samples(times, number + self._first_j, values)
+
+    def samples(self, names: Iterable[str] | None = None) -> Samples:
+        """Return the run's own samples: every solver step and both sides of every jump.
+
+        Parameters
+        ----------
+        names : iterable of str, optional
+            Which variables; default: all but the parameters.
+        """
+        points = [(t, x, flow.z) for flow in self._flows for t, x in flow.points]
+        return Samples(self.t.copy(), self.j.copy(), self._table(names, points))
+
+    # Jumps and lengths.
 
     def event_times(self, name: str) -> FloatArray:
         """Return the times in s of the jumps called `name`."""
@@ -144,36 +268,112 @@ class HybridArc:
             raise DeclarationError(unknown_name(f"{self.automaton.name} (jumps)", name, known))
         return np.array([jump.t for jump in self.jumps if jump.name == name])
 
+    @property
+    def flow_lengths(self) -> FloatArray:
+        """Length in s of the flow at each j, shape (number of jumps + 1,); zero inside a cascade."""
+        return np.array([flow.t1 - flow.t0 for flow in self._flows])
+
+    def inter_event_times(self, name: str | None = None) -> FloatArray:
+        """Return the times in s between successive jumps.
+
+        Parameters
+        ----------
+        name : str, optional
+            Only jumps of this name; default: all jumps but those declared internal.
+        """
+        if name is not None:
+            return np.diff(self.event_times(name))
+        internal = {info.name for info in self.automaton.jumps if info.internal}
+        return np.diff(np.array([jump.t for jump in self.jumps if jump.name not in internal]))
+
     def before(self, jump: JumpRecord) -> Values:
-        """Return all values just before a jump."""
-        return self._values(jump.t, jump.x_before, jump.z_before)
+        """Return all values just before a jump of this arc."""
+        flow = self._flow_of(jump.j)
+        return self._read.values(flow.t1, flow.at(flow.t1), flow.z)
 
     def after(self, jump: JumpRecord) -> Values:
-        """Return all values just after a jump."""
-        return self._values(jump.t, jump.x_after, jump.z_after)
+        """Return all values just after a jump of this arc."""
+        flow = self._flow_of(jump.j + 1)
+        return self._read.values(flow.t0, flow.x0, flow.z)
 
     @property
     def end(self) -> Values:
         """All values at the end of the run."""
         flow = self._flows[-1]
-        return self._values(flow.t1, flow.at(flow.t1), flow.z)
+        return self._read.values(flow.t1, flow.at(flow.t1), flow.z)
 
-    def _variable(self, name: str) -> Variable:
-        known = {variable.name: variable for variable in self.automaton.variables}
-        if name not in known:
-            raise DeclarationError(unknown_name(self.automaton.name, name, known))
-        return known[name]
+    def interpolation_error(self, name: str) -> FloatArray:
+        """Return how far interpolated values may lie from the solver's dense output, in the variable's unit and shape.
+
+        Zero in a run. In an arc from a file the largest error seen when it was saved: rounding, but for variables with
+        fast oscillations or discontinuities inside a step.
+        """
+        return self._read.interpolation_error(name)
+
+    # Other forms.
+
+    def to_dataframe(self, names: Iterable[str] | None = None) -> Any:
+        """Return the samples as a pandas DataFrame, see `hybrid_model.arc_tables.dataframe`."""
+        from hybrid_model.arc_tables import dataframe
+
+        return dataframe(self, names)
+
+    def to_xarray(self, names: Iterable[str] | None = None) -> Any:
+        """Return the samples as an xarray Dataset, see `hybrid_model.arc_tables.dataset`."""
+        from hybrid_model.arc_tables import dataset
+
+        return dataset(self, names)
+
+    def save(self, path: str | Path) -> None:
+        """Write the arc to a file that `load_arc` reads, see `hybrid_model.arc_file`."""
+        from hybrid_model.arc_file import save_arc
+
+        save_arc(self._read, self._flows, self, Path(path))
+
+    def _table(
+        self, names: Iterable[str] | None, points: Sequence[tuple[float, FloatArray, FloatArray]]
+    ) -> dict[str, FloatArray]:
+        chosen = [v.name for v in self.automaton.variables if v.kind is not Kind.PARAMETER] if names is None else names
+        return {
+            name: np.array([self._read.value(name, *point) for point in points], dtype=np.float64).reshape(
+                len(points), *self.variable(name).shape
+            )
+            for name in chosen
+        }
+
+    def _require_inside(self, times: FloatArray) -> None:
+        # Written so that a time that is not a number is outside as well.
+        if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
+            raise DeclarationError(
+                f"a time in [{times.min():g}, {times.max():g}] s lies outside the run, "
+                f"which covers [{self.t[0]:g}, {self.t[-1]:g}] s."
+            )
 
     def _flow_at(self, t: float, before: bool) -> FlowRecord:
         at = bisect.bisect_left(self._ends, t) if before else bisect.bisect_right(self._starts, t) - 1
         return self._flows[min(max(at, 0), len(self._flows) - 1)]
 
-    def _values(self, t: float, x: FloatArray, z: FloatArray) -> Values:
-        return self._layout.values(t, x, z, self._inputs.at(t), self._p)
+    def _flow_on(self, t: float, j: Any) -> FlowRecord:
+        flow = self._flow_of(j)
+        if not flow.t0 <= t <= flow.t1:
+            raise DeclarationError(
+                f"hybrid time (t, j) = ({t:.9g} s, {j}) lies outside the run: at j = {j} it covers "
+                f"[{flow.t0:.9g}, {flow.t1:.9g}] s."
+            )
+        return flow
 
-    def _value(self, name: str, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
-        s = self._values(t, x, z)
-        if any(place.variable.name == name for place in self._layout.places[Kind.OUTPUT]):
-            outputs = self.automaton.output_values(s)
-            return np.asarray(outputs[name], dtype=np.float64)
-        return np.asarray(s[name], dtype=np.float64)
+    def _flow_of(self, j: Any) -> FlowRecord:
+        number = j - self._first_j
+        if not 0 <= number < len(self._flows) or number != int(number):
+            raise DeclarationError(f"the run has no jump count j = {j}: it covers {self.j[0]} to {self.j[-1]}.")
+        return self._flows[int(number)]
+
+
+def _interval(what: str, given: Interval | None) -> Interval:
+    if given is None:
+        return -np.inf, np.inf
+    a, b = given
+    # Written so that an end that is not a number is refused as well.
+    if not a <= b:
+        raise DeclarationError(f"the interval {what} = ({a}, {b}) is empty: give its start first.")
+    return a, b

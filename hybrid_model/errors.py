@@ -19,3 +19,7 @@ class AlgebraicLoopError(HybridModelError, ValueError):
 
 class SimulationError(HybridModelError, RuntimeError):
     """A run cannot start or go on: bad arguments, or a value that is not finite."""
+
+
+class DataError(HybridModelError, ValueError):
+    """Data from outside, in a table or a file, are not what they must be."""

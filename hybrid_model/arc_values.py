@@ -1,0 +1,161 @@
+"""From a point of a flow to the values of all variables: what an arc is read by.
+
+A flow carries a vector along. In a run it holds the continuous states, and inputs and outputs are computed from it. In
+an arc from a file it holds states, inputs and outputs one after the other, so nothing has to be computed. Everything
+else about arcs is the same for both.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from hybrid_model.automaton import Automaton
+from hybrid_model.errors import DeclarationError
+from hybrid_model.layout import Layout
+from hybrid_model.signals import Inputs
+from hybrid_model.variables import FloatArray, Kind, Values, Variable, unknown_name
+
+
+class ArcValues(ABC):
+    """Reads the variables of an automaton off the points of its flows.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        Whose variables.
+    parameters : ndarray
+        The parameter vector of the run.
+    """
+
+    def __init__(self, automaton: Automaton, parameters: FloatArray) -> None:
+        self.automaton = automaton
+        self.parameters = parameters
+        self.layout = Layout(automaton)
+        self._places = {place.variable.name: place for places in self.layout.places.values() for place in places}
+
+    @abstractmethod
+    def states(self, x: FloatArray) -> FloatArray:
+        """Return the continuous states in the vector that a flow carries."""
+
+    @abstractmethod
+    def inputs(self, t: float, x: FloatArray) -> FloatArray:
+        """Return the input vector at a point of a flow."""
+
+    @abstractmethod
+    def outputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return the output vector at a point of a flow."""
+
+    def variable(self, name: str) -> Variable:
+        """Return a variable by name.
+
+        Raises
+        ------
+        DeclarationError
+            If there is none.
+        """
+        if name not in self._places:
+            known = {variable.name: variable for variable in self.automaton.variables}
+            raise DeclarationError(unknown_name(self.automaton.name, name, known))
+        return self._places[name].variable
+
+    def interpolation_error(self, name: str) -> FloatArray:
+        """Return how far a value inside a step may lie from the dense output of the run."""
+        return np.zeros(self.variable(name).shape)
+
+    def values(self, t: float, x: FloatArray, z: FloatArray) -> Values:
+        """Return all values but the outputs, by name."""
+        return self.layout.values(t, self.states(x), z, self.inputs(t, x), self.parameters)
+
+    def value(self, name: str, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return one variable's value, of the variable's shape."""
+        kind = self.variable(name).kind
+        if kind is Kind.STATE:
+            vector = self.states(x)
+        elif kind is Kind.DISCRETE:
+            vector = z
+        elif kind is Kind.PARAMETER:
+            vector = self.parameters
+        else:
+            vector = self.inputs(t, x) if kind is Kind.INPUT else self.outputs(t, x, z)
+        return np.asarray(self._places[name].take(vector), dtype=np.float64)
+
+    def channels(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return states, inputs and outputs in one vector."""
+        return np.concatenate([self.states(x), self.inputs(t, x), self.outputs(t, x, z)])
+
+
+class ComputedValues(ArcValues):
+    """Reads a run: inputs from their signals, outputs from the automaton.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        What ran.
+    parameters : ndarray
+        Its parameter vector.
+    signals : Inputs
+        Its inputs as functions of time.
+    """
+
+    def __init__(self, automaton: Automaton, parameters: FloatArray, signals: Inputs) -> None:
+        super().__init__(automaton, parameters)
+        self._signals = signals
+
+    def states(self, x: FloatArray) -> FloatArray:
+        """See `ArcValues.states`."""
+        return x
+
+    def inputs(self, t: float, x: FloatArray) -> FloatArray:
+        """See `ArcValues.inputs`; continuous from the right."""
+        return self._signals.at(t)
+
+    def outputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.outputs`."""
+        if self.layout.sizes[Kind.OUTPUT] == 0:
+            return np.zeros(0)
+        return self.layout.pack(Kind.OUTPUT, self.automaton.output_values(self.values(t, x, z)))
+
+
+class RecordedValues(ArcValues):
+    """Reads an arc whose flows carry states, inputs and outputs, see `ArcValues.channels`.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        Whose variables.
+    parameters : ndarray
+        The parameter vector of the run.
+    errors : ndarray
+        Interpolation error of each channel.
+    """
+
+    def __init__(self, automaton: Automaton, parameters: FloatArray, errors: FloatArray) -> None:
+        super().__init__(automaton, parameters)
+        self.errors = errors
+
+    def states(self, x: FloatArray) -> FloatArray:
+        """See `ArcValues.states`."""
+        return x[: self.layout.sizes[Kind.STATE]]
+
+    def inputs(self, t: float, x: FloatArray) -> FloatArray:
+        """See `ArcValues.inputs`."""
+        first = self.layout.sizes[Kind.STATE]
+        return x[first : first + self.layout.sizes[Kind.INPUT]]
+
+    def outputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.outputs`."""
+        return x[self.layout.sizes[Kind.STATE] + self.layout.sizes[Kind.INPUT] :]
+
+    def interpolation_error(self, name: str) -> FloatArray:
+        """See `ArcValues.interpolation_error`."""
+        vectors = {
+            Kind.STATE: self.states(self.errors),
+            Kind.INPUT: self.inputs(0.0, self.errors),
+            Kind.OUTPUT: self.outputs(0.0, self.errors, np.zeros(0)),
+        }
+        kind = self.variable(name).kind
+        return (
+            np.array(self._places[name].take(vectors[kind])) if kind in vectors else super().interpolation_error(name)
+        )
