@@ -20,6 +20,7 @@ from hybrid_model.transitions import (
     Trigger,
 )
 from hybrid_model.variables import Declaration, Dimension, Kind, Value, Values, Variable
+from hybrid_model.vector_form import VectorForm
 
 RESERVED = ("t", "jump_set", "jump_map")
 """Names with a meaning that no attribute of `HybridAutomaton` holds."""
@@ -86,6 +87,10 @@ class Automaton(ABC):
     def of_kind(self, *kinds: Kind) -> list[Variable]:
         """Return the variables of the given kinds, in declaration order."""
         return [v for v in self.variables if v.kind in kinds]
+
+    def vector_form(self) -> VectorForm:
+        """Return the maps on vectors, which executions evaluate; they give the same numbers as the maps above."""
+        return VectorForm(self)
 
 
 class HybridAutomaton(Automaton):

@@ -15,7 +15,7 @@ import numpy as np
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import SimulationError
 from hybrid_model.flow import FlowPiece, integrate
-from hybrid_model.layout import Layout, not_finite
+from hybrid_model.layout import not_finite
 from hybrid_model.locate import ulp
 from hybrid_model.signals import Inputs
 from hybrid_model.solver import Solver
@@ -26,6 +26,9 @@ from hybrid_model.zeno import ZenoGuard, ZenoMonitor
 
 ROUNDING = 8.0
 """Time events closer than this many ulp differ by rounding: 3 * 0.1 and 0.3 are one time."""
+
+_QUIET = np.errstate(all="ignore")
+"""Values that are not finite are found and named by the checks of rule 10, not by numpy's warnings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +81,8 @@ class Execution:
         Hybrid time.
     x, z, p : ndarray
         Continuous states, discrete states, parameters.
+    guards : int
+        Number of jumps on state.
     levels : ndarray
         The margin from which on each jump on state is due: zero, or slightly below where the crossing is so near to the
         end of a flow that it counts as reached (rule 6).
@@ -97,10 +102,13 @@ class Execution:
         if not math.isfinite(t_start):
             raise SimulationError(f"the start time of {automaton.name} is {t_start}: give a finite number.")
         self.automaton = automaton
-        self.layout = Layout(automaton)
+        self.maps = automaton.vector_form()
+        self.layout = self.maps.layout
         self.inputs = inputs or Inputs(self.layout)
         self.solver = solver or Solver()
         self.monitor = ZenoMonitor(zeno or ZenoGuard())
+        self._on_state = np.array([info.trigger is Trigger.STATE for info in automaton.jumps], dtype=bool)
+        self.guards = int(np.count_nonzero(self._on_state))
         self.t = float(t_start)
         self.j = 0
         self.x = self.layout.start(Kind.STATE)
@@ -119,9 +127,7 @@ class Execution:
 
     def compute_start(self) -> None:
         """Give the computed states their start values, from parameters, inputs and the other states."""
-        start = self.automaton.start_values(self.values())
-        self.x = self.layout.pack(Kind.STATE, start, self.x)
-        self.z = self.layout.pack(Kind.DISCRETE, start, self.z)
+        self.x, self.z = self.maps.start(self.t, self.x, self.z, self.inputs.at(self.t), self.p)
         self._require_finite("at the start")
 
     def values(self) -> Values:
@@ -142,21 +148,19 @@ class Execution:
 
     # Jumps.
 
+    @_QUIET
     def due(self) -> int | None:
         """Return the number of the first jump enabled now, in the automaton's fixed order (rules 2, 3 and 6)."""
         if not self.automaton.jumps:
             return None
-        s = self.values()
-        margins, levels, times = iter(self.jump_margins(s)), iter(self.levels), iter(self.event_times(s))
-        may_jump = self.automaton.priority is Priority.JUMP or self._left_flow_set or self._flow_is_over()
-        for index, info in enumerate(self.automaton.jumps):
-            if info.trigger is Trigger.STATE:
-                if next(margins) >= next(levels) and may_jump:
-                    return index
-            elif next(times) <= self.t:
-                return index
-        return None
+        due = np.zeros(len(self.automaton.jumps), dtype=bool)
+        enabled = self.margins(self.t, self.x)[: self.guards] >= self.levels
+        if enabled.any() and (self.automaton.priority is Priority.JUMP or self._left_flow_set or self._flow_is_over()):
+            due[self._on_state] = enabled
+        due[~self._on_state] = self.event_times() <= self.t
+        return int(due.argmax()) if due.any() else None
 
+    @_QUIET
     def jump(self, index: int) -> JumpRecord:
         """Take a jump: reset states at the same t, advance j.
 
@@ -166,12 +170,9 @@ class Execution:
             If a new value is not finite, or a time event does not move on.
         """
         info = self.automaton.jumps[index]
-        before = self.values()
-        with np.errstate(all="ignore"):
-            new = self.automaton.reset(index, before)
         x, z = self.x, self.z
-        self.x = self.layout.pack(Kind.STATE, new, x)
-        self.z = self.layout.pack(Kind.DISCRETE, new, z)
+        times = self.event_times()
+        self.x, self.z = self.maps.reset(index, self.t, x, z, self.inputs.at(self.t), self.p)
         self._require_finite(f"after jump {info.name!r} at t = {self.t:.9g} s")
         self._require_whole(f"after jump {info.name!r} at t = {self.t:.9g} s")
         record = JumpRecord(self.t, self.j, index, info.name, x, z, self.x, self.z)
@@ -180,9 +181,9 @@ class Execution:
         on_state = info.trigger is Trigger.STATE
         if on_state:
             self.levels = self.levels.copy()
-            self.levels[self._number_of_guard(index)] = 0.0
+            self.levels[self._row(index)] = 0.0
         else:
-            self._require_progress(index, before)
+            self._require_progress(index, times)
         message = self.monitor.record(self.automaton.name, info.name, self.t, on_state=on_state)
         if message:
             self.stopped, self.message = Stop.ZENO, message
@@ -191,68 +192,82 @@ class Execution:
             self.message = f"{self.automaton.name}: {self.j} jumps by t = {self.t:.9g} s. {Stop.JUMPS.value}"
         return record
 
+    @_QUIET
     def in_flow_set(self, tolerance: float) -> bool:
         """Whether the state lies in the flow set, or outside by no more than `tolerance`."""
-        return not self.automaton.has_flow_set or self.flow_margin(self.values()) >= -tolerance
+        return not self.automaton.has_flow_set or self.flow_margin() >= -tolerance
 
     def _flow_is_over(self) -> bool:
         """Whether the state is outside the flow set; on the border, up to rounding, whether the flow leads out."""
         if not self.automaton.has_flow_set:
             return False
-        margin = self.flow_margin(self.values())
+        margin = self.flow_margin()
         tolerance = self.solver.event_tolerance
         if margin > 0.0 or margin < -tolerance:
             return margin < 0.0
-        with np.errstate(all="ignore"):
-            rates = self.layout.pack(Kind.STATE, self.automaton.derivatives(self.values()))
-        return self.flow_margin(self.values_at(self.t + tolerance, self.x + tolerance * rates)) < margin
+        soon = self.t + tolerance
+        return float(self.margins(soon, self.x + tolerance * self.rates_at(self.t, self.x))[-1]) < margin
 
-    # Margins and times, which must be numbers (rule 10).
+    # Rates, margins and times; the latter two must be numbers (rule 10).
 
-    def jump_margins(self, s: Values) -> list[float]:
-        """Return the margins of the jumps on state."""
-        with np.errstate(all="ignore"):
-            margins = [float(margin) for margin in self.automaton.jump_margins(s)]
-        return self._require_numbers(margins, Trigger.STATE, "margin", s)
+    def rates_at(self, t: float, x: FloatArray) -> FloatArray:
+        """Return dx/dt at a point of the present flow."""
+        return self.maps.rates(t, x, self.z, self.inputs.at(t), self.p)
 
-    def event_times(self, s: Values) -> list[float]:
+    def margins(self, t: float, x: FloatArray) -> FloatArray:
+        """Return the margins at a point of the present flow: of the jumps on state, and then of the flow set if any."""
+        return self._require_margins(self.maps.margins(t, x, self.z, self.inputs.at(t), self.p), t)
+
+    def margins_along(self, times: FloatArray, x: FloatArray) -> FloatArray:
+        """Return the margins at points of the present flow, shape (times, margins); x has shape (times, states)."""
+        u = [self.inputs.at(float(t)) for t in times] if self.inputs.vary else [self.inputs.at(self.t)] * len(times)
+        table = self.maps.margins_along(times, x, self.z, u, self.p)
+        if np.isnan(table).any():
+            at = int(np.isnan(table).any(axis=1).argmax())
+            self._require_margins(table[at], float(times[at]))
+        return table
+
+    def flow_margin(self) -> float:
+        """Return the margin of the flow set, which the automaton must have."""
+        return float(self.margins(self.t, self.x)[-1])
+
+    def event_times(self) -> FloatArray:
         """Return the absolute times in s of the jumps on time."""
-        with np.errstate(all="ignore"):
-            times = [float(time) for time in self.automaton.event_times(s)]
-        return self._require_numbers(times, Trigger.TIME, "time", s)
+        times = self.maps.event_times(self.t, self.x, self.z, self.inputs.at(self.t), self.p)
+        if np.isnan(times).any():
+            raise SimulationError(self._undefined("time of jump", self._name(times, on_state=False), self.t))
+        return times
 
-    def flow_margin(self, s: Values) -> float:
-        """Return the margin of the flow set."""
-        with np.errstate(all="ignore"):
-            margin = float(self.automaton.flow_margin(s))
-        if math.isnan(margin):
-            raise SimulationError(
-                f"{self.automaton.name}: the margin of the flow set is not a number at t = {s['t']:.9g} s: it must "
-                "be defined wherever a flow or a jump leads."
-            )
-        return margin
+    def _require_margins(self, margins: FloatArray, t: float) -> FloatArray:
+        if np.isnan(margins).any():
+            if np.isnan(margins[: self.guards]).any():
+                raise SimulationError(self._undefined("margin of jump", self._name(margins, on_state=True), t))
+            raise SimulationError(self._undefined("margin of", "the flow set", t))
+        return margins
 
-    def _require_numbers(self, numbers: list[float], trigger: Trigger, what: str, s: Values) -> list[float]:
-        if any(map(math.isnan, numbers)):
-            names = [info.name for info in self.automaton.jumps if info.trigger is trigger]
-            name = next(name for name, number in zip(names, numbers, strict=True) if math.isnan(number))
-            raise SimulationError(
-                f"{self.automaton.name}: the {what} of jump {name!r} is not a number at t = {s['t']:.9g} s: it must be "
-                "defined wherever a flow or a jump leads."
-            )
-        return numbers
+    def _undefined(self, what: str, whose: str, t: float) -> str:
+        return (
+            f"{self.automaton.name}: the {what} {whose} is not a number at t = {t:.9g} s: it must be defined wherever "
+            "a flow or a jump leads."
+        )
+
+    def _name(self, numbers: FloatArray, *, on_state: bool) -> str:
+        rows = np.flatnonzero(self._on_state == on_state)
+        return repr(self.automaton.jumps[rows[np.isnan(numbers[: len(rows)]).argmax()]].name)
 
     # Flow.
 
+    @_QUIET
     def next_time_event(self) -> float:
         """Return the earliest known time, in s, at which a time event or an input's breakpoint comes.
 
         Times that differ by rounding only are one: the latest of them.
         """
-        times = [*self.event_times(self.values()), self.inputs.next_breakpoint(self.t)]
+        times = [*map(float, self.event_times()), self.inputs.next_breakpoint(self.t)]
         first = min(times)
         return max(time for time in times if time <= first + ROUNDING * ulp(first)) if math.isfinite(first) else first
 
+    @_QUIET
     def flow(self, limit: float) -> list[FlowPiece]:
         """Flow to the first event or to `limit`, whichever comes first, and never across a time event (rule 5).
 
@@ -279,7 +294,7 @@ class Execution:
         self._left_flow_set = left
         tolerance = self.solver.event_tolerance
         # Under flow priority a state that is outside by rounding flows on while it stays so (rule 3).
-        if left and self.due() is None and not self.flow_margin(self.values()) > -tolerance:
+        if left and self.due() is None and not self.flow_margin() > -tolerance:
             self._block("the flow left the flow set, and the state is not in the jump set")
         return pieces
 
@@ -289,33 +304,34 @@ class Execution:
         self.levels = self._zero_levels()
 
     def _zero_levels(self) -> FloatArray:
-        return np.zeros(sum(info.trigger is Trigger.STATE for info in self.automaton.jumps))
+        return np.zeros(self.guards)
 
-    def _number_of_guard(self, index: int) -> int:
-        return sum(info.trigger is Trigger.STATE for info in self.automaton.jumps[:index])
+    def _row(self, index: int) -> int:
+        """Return which of the jumps with its trigger jump `index` is."""
+        return int(np.count_nonzero(self._on_state[:index] == self._on_state[index]))
 
+    @_QUIET
     def drift(self, t: float) -> None:
         """Move on by no more than the event tolerance with the present derivative, although a jump is due.
 
         Simultaneous events of other parts are handled at the latest of their times (rule 6).
         """
         if t > self.t:
-            rates = self.layout.pack(Kind.STATE, self.automaton.derivatives(self.values()))
-            self.x = self.x + (t - self.t) * rates
+            self.x = self.x + (t - self.t) * self.rates_at(self.t, self.x)
             self.t = t
 
     def _block(self, what: str) -> None:
         self.stopped = Stop.BLOCKED
         state = self.layout.describe({Kind.STATE: self.x, Kind.DISCRETE: self.z})
-        margin = self.flow_margin(self.values())
+        margin = self.flow_margin()
         self.message = (
             f"{self.automaton.name}: {what} at t = {self.t:.9g} s: {state}; margin of the flow set {margin:.3g}. "
             "Enlarge one of the sets, or make the jump map land in their union."
         )
 
     def _require_finite(self, when: str) -> None:
-        bad = not_finite(self.layout.names(Kind.STATE), self.x) or not_finite(self.layout.names(Kind.DISCRETE), self.z)
-        if bad:
+        if not (np.isfinite(self.x).all() and np.isfinite(self.z).all()):
+            bad = not_finite(self.layout, Kind.STATE, self.x) or not_finite(self.layout, Kind.DISCRETE, self.z)
             raise SimulationError(f"{self.automaton.name}: {bad} {when}: states must stay finite numbers.")
 
     def _require_whole(self, when: str) -> None:
@@ -327,13 +343,10 @@ class Execution:
                 "declared integer and must stay a whole number."
             )
 
-    def _require_progress(self, index: int, before: Values) -> None:
-        infos = self.automaton.jumps
-        at = sum(info.trigger is Trigger.TIME for info in infos[:index])
-        was = self.event_times(before)[at]
-        now = self.event_times(self.values())[at]
+    def _require_progress(self, index: int, times: FloatArray) -> None:
+        was, now = times[self._row(index)], self.event_times()[self._row(index)]
         if not now > was:
             raise SimulationError(
-                f"{self.automaton.name}: time event {infos[index].name!r} was due at {was:.9g} s and after its "
-                f"jump is due at {now:.9g} s: its jump map must move its time on."
+                f"{self.automaton.name}: time event {self.automaton.jumps[index].name!r} was due at {was:.9g} s and "
+                f"after its jump is due at {now:.9g} s: its jump map must move its time on."
             )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,8 +12,8 @@ import numpy as np
 
 from hybrid_model.errors import SimulationError
 from hybrid_model.layout import not_finite
-from hybrid_model.locate import first_nonnegative, rise_in_samples, scan_times, ulp
-from hybrid_model.transitions import Priority, Trigger
+from hybrid_model.locate import DEGREE, first_nonnegative, first_rise, may_rise, scan_times, ulp
+from hybrid_model.transitions import Priority
 from hybrid_model.variables import FloatArray, Kind
 
 if TYPE_CHECKING:
@@ -40,20 +41,27 @@ class FlowPiece:
     x0, x1 : ndarray
         Continuous states there.
     interpolate : callable
-        ``interpolate(t) -> x`` between the ends: the solver's dense output.
+        ``interpolate(t) -> x`` between the ends, shape (states,) or (states, times): the solver's dense output.
     """
 
     t0: float
     t1: float
     x0: FloatArray
     x1: FloatArray
-    interpolate: Callable[[float], FloatArray]
+    interpolate: Callable[[float | FloatArray], FloatArray]
 
     def at(self, t: float) -> FloatArray:
         """Return the continuous states at `t` in [t0, t1]."""
         if t <= self.t0:
             return self.x0
         return self.x1 if t >= self.t1 else self.interpolate(t)
+
+    def sample(self, times: FloatArray) -> FloatArray:
+        """Return the continuous states at times in [t0, t1], shape (times, states)."""
+        states = np.asarray(self.interpolate(times)).T
+        states[times <= self.t0] = self.x0
+        states[times >= self.t1] = self.x1
+        return states
 
 
 def integrate(execution: Execution, limit: float, time_event: float) -> tuple[list[FlowPiece], bool]:
@@ -93,7 +101,7 @@ def integrate(execution: Execution, limit: float, time_event: float) -> tuple[li
 
 
 def _move(execution: Execution, piece: FlowPiece) -> FlowPiece:
-    bad = not_finite(execution.layout.names(Kind.STATE), piece.x1)
+    bad = not_finite(execution.layout, Kind.STATE, piece.x1)
     if bad:
         raise SimulationError(f"{execution.automaton.name}: {bad} at t = {piece.t1:.9g} s: states must stay finite.")
     execution.t, execution.x = piece.t1, piece.x1
@@ -102,7 +110,12 @@ def _move(execution: Execution, piece: FlowPiece) -> FlowPiece:
 
 def _straight(t0: float, t1: float, x0: FloatArray, x1: FloatArray) -> FlowPiece:
     span = t1 - t0 or 1.0
-    return FlowPiece(t0, t1, x0, x1, lambda t: x0 + (x1 - x0) * ((t - t0) / span))
+
+    def interpolate(t: float | FloatArray) -> FloatArray:
+        part = (np.asarray(t) - t0) / span
+        return x0 + (x1 - x0) * part if part.ndim == 0 else x0[:, None] + (x1 - x0)[:, None] * part
+
+    return FlowPiece(t0, t1, x0, x1, interpolate)
 
 
 class _FlowMap:
@@ -124,12 +137,9 @@ class _FlowMap:
 
     def __call__(self, t: float, x: FloatArray) -> FloatArray:
         execution = self._execution
-        with np.errstate(all="ignore"):
-            s = execution.values_at(min(t, self._last), x)
-            rates = execution.layout.pack(Kind.STATE, execution.automaton.derivatives(s))
-        if not np.all(np.isfinite(rates)):
-            names = [f"derivative of {name}" for name in execution.layout.names(Kind.STATE)]
-            self.trouble = f"{not_finite(names, rates)} at t = {t:.9g} s"
+        rates = execution.rates_at(min(t, self._last), x)
+        if not np.isfinite(rates).all():
+            self.trouble = f"derivative of {not_finite(execution.layout, Kind.STATE, rates)} at t = {t:.9g} s"
         if self.trouble:
             self._count += 1
             if self._count > ATTEMPTS * (1 + rates.size):
@@ -149,7 +159,7 @@ def _steps(execution: Execution, end: float) -> Any:
     if flow_map.trouble:
         raise SimulationError(_failure(execution, flow_map, execution.t, execution.x, None))
     first = min(execution.next_step, end - execution.t) if execution.next_step else None
-    stepper = options.method.value(
+    stepper = options.stepper(
         flow_map,
         execution.t,
         execution.x,
@@ -194,45 +204,50 @@ class _Watch:
         automaton = execution.automaton
         self._execution = execution
         self._tolerance = execution.solver.event_tolerance
-        self._guards = sum(info.trigger is Trigger.STATE for info in automaton.jumps)
+        self._panels = math.ceil(execution.solver.scan_points / DEGREE)
+        self._guards = execution.guards
         rows = range(self._guards + automaton.has_flow_set)
         # Under flow priority only the exit counts, and it counts at once; else, and for a state that rounding has put
         # outside already, it counts beyond the tolerance.
         flow_first = automaton.priority is Priority.FLOW
         self._watched = rows[self._guards :] if flow_first else rows
         self._slack = FLOW_FIRST_SLACK if flow_first and execution.in_flow_set(0.0) else self._tolerance
-        self._last: tuple[float, FloatArray] | None = None
 
     def _margins(self, t: float, x: FloatArray) -> FloatArray:
         """Return the jump margins and, last, the margin by which the flow set is left."""
-        execution = self._execution
-        s = execution.values_at(t, x)
-        row = execution.jump_margins(s)
-        if execution.automaton.has_flow_set:
-            row.append(-execution.flow_margin(s) - self._slack)
-        return np.array(row)
+        row = self._execution.margins(t, x)
+        if len(row) > self._guards:
+            row[-1] = -row[-1] - self._slack
+        return row
 
     def first_event(self, piece: FlowPiece, end: float) -> tuple[float, bool] | None:
         """Return the time of the first event in a step, and whether it is an exit from the flow set."""
         if not self._watched:
             return None
-        times = scan_times(piece.t0, piece.t1, self._execution.solver.scan_points)
-        first = self._last[1] if self._last and self._last[0] == piece.t0 else self._margins(piece.t0, piece.x0)
-        table = np.array([first, *(self._margins(float(t), piece.at(float(t))) for t in times[1:])])
-        self._last = (piece.t1, table[-1])
-        if self._execution.automaton.has_flow_set and table[0, -1] >= 0.0:
-            return piece.t0, True
+        for a, b in itertools.pairwise(np.linspace(piece.t0, piece.t1, self._panels + 1)):
+            found = self._first_in_panel(piece, float(a), float(b))
+            if found is not None:
+                t, row = found
+                return self._latest_of_simultaneous(piece, t, end), row >= self._guards
+        return None
+
+    def _first_in_panel(self, piece: FlowPiece, a: float, b: float) -> tuple[float, int] | None:
+        times = scan_times(a, b)
+        table = self._execution.margins_along(times, piece.sample(times))
+        if table.shape[1] > self._guards:
+            table[:, -1] = -table[:, -1] - self._slack
+            if table[0, -1] >= 0.0:
+                return a, self._guards
+        candidates = may_rise(table)
         found = [
             (first_nonnegative(margin, *bracket), row)
             for row in self._watched
+            if candidates[row]
             for margin in [self._along(piece, row)]
-            for bracket in [rise_in_samples(times, table[:, row], margin)]
+            for bracket in [first_rise(times, table[:, row], margin)]
             if bracket is not None
         ]
-        if not found:
-            return None
-        t, row = min(found)
-        return self._latest_of_simultaneous(piece, t, end), row >= self._guards
+        return min(found) if found else None
 
     def raise_levels(self, piece: FlowPiece) -> None:
         """Enable the guards that would cross within the tolerance if the flow did not end with this piece (rule 6).
@@ -268,9 +283,7 @@ class _Watch:
     def _latest_of_simultaneous(self, piece: FlowPiece, t: float, end: float) -> float:
         """Move the instant on so that every guard that crosses within the tolerance has crossed (rule 6)."""
         horizon = min(t + self._tolerance, end)
-        latest = t
-        for row in range(self._guards):
-            margin = self._along(piece, row)
-            if margin(t) < 0.0 <= margin(horizon):
-                latest = max(latest, first_nonnegative(margin, t, horizon))
-        return latest
+        x, then = piece.at(t), piece.at(horizon) if horizon <= piece.t1 else piece.interpolate(horizon)
+        crossing = (self._margins(t, x) < 0.0) & (self._margins(horizon, then) >= 0.0)
+        rows = np.flatnonzero(crossing[: self._guards])
+        return max([t, *(first_nonnegative(self._along(piece, int(row)), t, horizon) for row in rows)])

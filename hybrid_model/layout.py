@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DeclarationError
 from hybrid_model.transitions import Assignments
 from hybrid_model.variables import FloatArray, Kind, Value, Values, Variable, element_names
+
+if TYPE_CHECKING:
+    from hybrid_model.automaton import Automaton
 
 
 @dataclass(frozen=True)
@@ -109,7 +112,7 @@ class Layout:
         return shown + (f", and {len(pairs) - 12} more" if len(pairs) > 12 else "")
 
 
-def not_finite(names: Sequence[str], vector: FloatArray) -> str | None:
-    """Return the first ``name = value`` that is not finite, or None."""
+def not_finite(layout: Layout, kind: Kind, vector: FloatArray) -> str | None:
+    """Return the first ``name = value`` in the vector of a kind that is not finite, or None."""
     bad = np.flatnonzero(~np.isfinite(vector))
-    return None if bad.size == 0 else f"{names[bad[0]]} = {vector[bad[0]]}"
+    return None if bad.size == 0 else f"{layout.names(kind)[bad[0]]} = {vector[bad[0]]}"

@@ -1,12 +1,17 @@
 """The trigger rule on (t0, t1]: find the first time at which a margin goes from negative to zero or above.
 
-Along one step of a solver a margin is sampled at the step's ends, close to its ends, and at `scan_points` places
-between them. A sign change between neighbouring samples is bracketed; where three neighbouring samples show a negative
-local maximum, the maximum itself is sought, so that two crossings close together are found as well. The samples close
-to the ends tell whether the margin rises into the step and falls out of it, so this holds in its first and last
-interval too. What can still be missed is a margin with more than one maximum between a sample and the next but one, or
-so sharp a peak that the samples beside it do not show it: in less than ``2 h/(scan_points + 1)`` for a step h. Tighter
-tolerances, more `scan_points` or a `max_step` make that smaller.
+Along one step of a solver each margin is sampled at Chebyshev points. The polynomial through the samples has Bernstein
+coefficients that enclose it, and Chebyshev coefficients whose tail tells how well it represents the margin. With both:
+
+* coefficients all below zero by more than the tail: the margin does not reach zero in the step;
+* differences of the coefficients of one sign by more than the tail: the margin is monotone and its ends decide;
+* neither: the step is halved, and its first half is looked at first.
+
+So every crossing is found, however close to another, of a margin that a polynomial of degree 8 represents on some
+halving of the step: all smooth margins, and exactly those that are affine in the states, because the dense output of
+the default solver is such a polynomial. A kink ends the halving where the margin cannot be near zero, or after
+`HALVINGS` of them. What can be missed is a feature that no sample shows: a peak, sharp against the distance of
+neighbouring samples, which is at most a fifth of the step. More `scan_points` or a `max_step` make that smaller.
 """
 
 from __future__ import annotations
@@ -14,14 +19,31 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+import numpy.typing as npt
+from scipy.optimize import brentq
+from scipy.special import comb
 
 from hybrid_model.variables import FloatArray
 
+BoolArray = npt.NDArray[np.bool_]
 Margin = Callable[[float], float]
 SMALLEST = float(np.finfo(np.float64).tiny)
-NEAR_END = 1e-3
-"""The samples close to a step's ends are this part of the distance of the others away from them."""
+DEGREE = 8
+"""Degree of the polynomials; the dense output of DOP853 has degree 7."""
+HALVINGS = 60
+"""How often one margin is halved in one step: a simple crossing needs none, a kink some ten."""
+
+
+def _matrices(degree: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the points on [0, 1], and what makes Bernstein and the last two Chebyshev coefficients of samples."""
+    k = np.arange(degree + 1)
+    points = 0.5 - 0.5 * np.cos(np.pi * k / degree)
+    bernstein: FloatArray = comb(degree, k) * points[:, None] ** k * (1.0 - points[:, None]) ** (degree - k)
+    chebyshev = np.polynomial.chebyshev.chebvander(2.0 * points - 1.0, degree)
+    return points, np.linalg.inv(bernstein), np.asarray(np.linalg.inv(chebyshev)[-2:], dtype=np.float64)
+
+
+POINTS, TO_BERNSTEIN, TO_TAIL = _matrices(DEGREE)
 
 
 def ulp(t: float) -> float:
@@ -29,33 +51,41 @@ def ulp(t: float) -> float:
     return float(np.spacing(max(abs(t), 1.0)))
 
 
-def scan_times(a: float, b: float, interior: int) -> FloatArray:
-    """Return the times at which margins are sampled along a step.
+def scan_times(a: float, b: float) -> FloatArray:
+    """Return the times at which margins are sampled between `a` and `b`, both included; shape (DEGREE + 1,)."""
+    times = a + (b - a) * POINTS
+    times[-1] = b
+    return times
+
+
+def may_rise(samples: FloatArray) -> BoolArray:
+    """Tell which margins may go from negative to zero or above.
 
     Parameters
     ----------
-    a, b : float
-        Ends of the step in s.
-    interior : int
-        Number of places, evenly between the ends, beside those close to the ends.
+    samples : ndarray, shape (DEGREE + 1, m)
+        Margins at the scan times.
 
     Returns
     -------
-    ndarray
-        Increasing, from a to b.
+    ndarray of bool, shape (m,)
+        False only where the polynomial through the samples and its tail exclude it.
     """
-    even = np.linspace(a, b, interior + 2)
-    near = NEAR_END * (even[1] - even[0])
-    return np.unique(np.concatenate([even, [min(a + near, b), max(b - near, a)]]))
+    # Samples that are not finite give coefficients that are no numbers, and those count as a rise.
+    with np.errstate(invalid="ignore"):
+        bounds = TO_BERNSTEIN @ samples
+        tail = np.abs(TO_TAIL @ samples).sum(axis=0)
+    excluded: BoolArray = (bounds.max(axis=0) + tail < 0.0) | (bounds.min(axis=0) - tail >= 0.0)
+    return ~excluded
 
 
-def rise_in_samples(times: FloatArray, samples: FloatArray, margin: Margin) -> tuple[float, float] | None:
-    """Find the first bracket (a, b] in which a sampled margin rises from negative to zero or above.
+def first_rise(times: FloatArray, samples: FloatArray, margin: Margin) -> tuple[float, float] | None:
+    """Find the first bracket (a, b] in which a margin rises from negative to zero or above.
 
     Parameters
     ----------
-    times, samples : ndarray, shape (n,)
-        Increasing times in s, and the margin there.
+    times, samples : ndarray, shape (DEGREE + 1,)
+        Scan times in s, and the margin there.
     margin : callable
         The margin as a function of time.
 
@@ -64,33 +94,41 @@ def rise_in_samples(times: FloatArray, samples: FloatArray, margin: Margin) -> t
     (float, float) or None
         Times with margin(a) < 0 <= margin(b).
     """
-    for k in range(1, len(times)):
-        if samples[k - 1] < 0.0 <= samples[k]:
-            return float(times[k - 1]), float(times[k])
-        if k > 1 and samples[k - 2] <= samples[k - 1] < 0.0 and samples[k] <= samples[k - 1]:
-            top = _top(times[k - 2 : k + 1], samples[k - 2 : k + 1], margin)
-            if top is not None:
-                return float(times[k - 2]), top
+    waiting = [(times, samples)]
+    halvings = 0
+    while waiting:
+        times, samples = waiting.pop()
+        sure, bracket = _judge(times, samples)
+        if not sure and halvings < HALVINGS and times[-1] - times[0] > DEGREE**2 * ulp(times[-1]):
+            halvings += 1
+            middle = 0.5 * (float(times[0]) + float(times[-1]))
+            halves = [scan_times(float(times[0]), middle), scan_times(middle, float(times[-1]))]
+            sampled = [(half, np.array([margin(float(t)) for t in half])) for half in halves]
+            waiting += reversed(sampled)
+        elif bracket is not None:
+            return bracket
     return None
 
 
-def _top(times: FloatArray, samples: FloatArray, margin: Margin) -> float | None:
-    """Seek a time with margin >= 0 around a negative local maximum of three samples."""
-    if not np.isfinite(samples[1]):
-        return None
-    # Most maxima are far below zero: twice the rise of the parabola through the samples tells, with room for other
-    # shapes than parabolas.
-    before, after = times[1] - times[0], times[2] - times[1]
-    up, down = (samples[1] - samples[0]) / before, (samples[1] - samples[2]) / after
-    bend = (up + down) / (before + after)
-    slope = (up * after - down * before) / (before + after)
-    rise = slope**2 / (4.0 * bend) if bend > 0.0 else 0.0
-    if samples[1] + 2.0 * rise + max(samples[1] - samples[0], samples[1] - samples[2]) < 0.0:
-        return None
-    found = minimize_scalar(
-        lambda t: -margin(float(t)), bounds=(times[0], times[2]), method="bounded", options={"xatol": 1e-12}
-    )
-    return float(found.x) if margin(float(found.x)) >= 0.0 else None
+def _judge(times: FloatArray, samples: FloatArray) -> tuple[bool, tuple[float, float] | None]:
+    """Return whether the samples settle where the margin rises first, and the bracket that they show."""
+    if not np.all(np.isfinite(samples)):
+        return True, _between_samples(times, samples)
+    bounds = TO_BERNSTEIN @ samples
+    tail = float(np.abs(TO_TAIL @ samples).sum())
+    if bounds.max() + tail < 0.0 or bounds.min() - tail >= 0.0:
+        return True, None
+    # The derivative of the polynomial is off by up to the degree squared times the tail, its coefficients are the
+    # differences times the degree.
+    differences = np.diff(bounds)
+    if differences.min() > DEGREE * tail or differences.max() < -DEGREE * tail:
+        return True, (float(times[0]), float(times[-1])) if samples[0] < 0.0 <= samples[-1] else None
+    return False, _between_samples(times, samples)
+
+
+def _between_samples(times: FloatArray, samples: FloatArray) -> tuple[float, float] | None:
+    rises = np.flatnonzero((samples[:-1] < 0.0) & (samples[1:] >= 0.0))
+    return (float(times[rises[0]]), float(times[rises[0] + 1])) if rises.size else None
 
 
 def first_nonnegative(margin: Margin, a: float, b: float) -> float:

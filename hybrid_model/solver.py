@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
 
@@ -27,14 +28,14 @@ class Solver:
 
     Attributes
     ----------
-    method : Method
-        Stepper; Radau, BDF and LSODA for stiff flows.
+    method : Method or str
+        Stepper, or its name: ``"DOP853"``, ``"RK45"``, and for stiff flows ``"Radau"``, ``"BDF"`` and ``"LSODA"``.
     rtol, atol : float
         Relative and absolute tolerance of a step, as in SciPy.
     max_step : float
         Longest step in s.
     scan_points : int
-        Interior samples of every margin in a step; see `hybrid_model.locate` for what that bounds.
+        Samples of every margin in a step, in whole eights; see `hybrid_model.locate` for what that bounds.
     event_tolerance : float
         In s: crossings closer than this are taken at one instant, in the fixed order of the jumps. The same number, in
         the margin's unit, is how far outside the flow set rounding may leave a state.
@@ -42,10 +43,11 @@ class Solver:
     Raises
     ------
     SimulationError
-        If a number is not positive, a tolerance is not finite, or `scan_points` is not whole.
+        For a method of another name, if a number is not positive, a tolerance is not finite, or `scan_points` is not
+        whole.
     """
 
-    method: Method = Method.DOP853
+    method: Method | str = Method.DOP853
     rtol: float = 1e-13
     atol: float = 1e-15
     max_step: float = math.inf
@@ -53,9 +55,24 @@ class Solver:
     event_tolerance: float = 1e-9
 
     def __post_init__(self) -> None:
+        if not isinstance(self.method, Method):
+            object.__setattr__(self, "method", _by_name(self.method))
         for name in ("rtol", "atol", "max_step", "scan_points", "event_tolerance"):
             value = getattr(self, name)
             if not value > 0 or (math.isinf(value) and name != "max_step"):
                 raise SimulationError(f"solver option {name} = {value}: give a positive number.")
         if self.scan_points != int(self.scan_points):
             raise SimulationError(f"solver option scan_points = {self.scan_points}: give a whole number.")
+
+    @property
+    def stepper(self) -> Any:
+        """SciPy's class of the method."""
+        return Method(self.method).value
+
+
+def _by_name(name: str) -> Method:
+    known = {method.value.__name__: method for method in Method}
+    found = {key.upper(): method for key, method in known.items()}.get(str(name).upper())
+    if found is None:
+        raise SimulationError(f"solver option method = {name!r}: the methods are {', '.join(known)}.")
+    return found
