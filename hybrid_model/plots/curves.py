@@ -66,7 +66,8 @@ def plot_flow(
     for name in names:
         ax.plot(*curve(arc, name), label=(labels or {}).get(name, name))
     ax.set_xlabel(TIME)
-    ax.set_xlim(arc.t[0], arc.t[-1])
+    if arc.t[-1] > arc.t[0]:
+        ax.set_xlim(arc.t[0], arc.t[-1])
     return ax
 
 

@@ -94,6 +94,7 @@ def plot_inter_event_times(
         own = {"label": label, "marker": MARKERS[k % len(MARKERS)]} if few else {"label": "_", "color": "k"}
         _draw_gaps(ax, row, {"marker": "o", "markersize": 4, "linestyle": "none"} | own | line_options)
     if bound is not None:
+        _make_room(ax, bound, bound)
         ax.axhline(bound, color="0.4", linestyle=(0, (5, 2)), linewidth=1.0, zorder=1.5, label="lower bound")
     ax.set_xlabel(TIME)
     ax.set_ylabel(f"time since the last {common or 'event'} (s)")
@@ -106,16 +107,19 @@ def _draw_gaps(ax: Axes, times: FloatArray, options: dict[str, Any]) -> None:
     apart = gaps > 0.0
     (line,) = ax.plot(times[1:][apart], gaps[apart], **options)
     if apart.any():
-        # Room of a factor of three: gaps that are equal up to rounding must not fill the axis with their last digits.
-        room = np.array([[times[1], gaps[apart].min() / 3.0], [times[1], gaps[apart].max() * 3.0]])
-        ax.update_datalim(room, updatex=False)
-        ax.autoscale_view()
+        _make_room(ax, gaps[apart].min(), gaps[apart].max())
     together = times[1:][~apart]
     if together.size:
         first = ONE_INSTANT not in ax.get_legend_handles_labels()[1]
         bottom: dict[str, Any] = {"marker": "v", "linestyle": "none", "color": line.get_color(), "clip_on": False}
         label = ONE_INSTANT if first else f"_{ONE_INSTANT}"
         ax.plot(together, np.zeros(together.size), transform=ax.get_xaxis_transform(), label=label, **bottom)
+
+
+def _make_room(ax: Axes, low: float, high: float) -> None:
+    # A factor of three: gaps that are equal up to rounding must not fill the axis with their last digits.
+    ax.update_datalim([(0.0, low / 3.0), (0.0, high * 3.0)], updatex=False)
+    ax.autoscale_view()
 
 
 def event_times(events: Events, names: tuple[str, ...]) -> dict[str, FloatArray]:

@@ -86,10 +86,10 @@ def plot_phase(
         For an unknown variable or jump, or an array without an element.
     """
     x, y = find_scalar(arc, horizontal), find_scalar(arc, vertical)
-    ax = new_axes(ax)
     trace = Trace(arc)
     points = [trace.scalar(x), trace.scalar(y)]
     marked = np.logical_or(*(marked_jumps(trace, s, v, jumps) for s, v in zip((x, y), points, strict=True)))
+    ax = new_axes(ax)
     flows = draw_arc(ax, trace, points, marked, line_options)
     present = ax.get_legend_handles_labels()[1]
     for at, marker, text in ((0, "^", "start"), (-1, "s", "end")):
@@ -128,10 +128,10 @@ def plot_hybrid_arc(
         For an unknown variable or jump, an array without an element, or axes of two dimensions.
     """
     scalar = find_scalar(arc, name)
-    ax = new_axes(ax, solid=True)
     trace = Trace(arc)
     values = trace.scalar(scalar)
     marked = marked_jumps(trace, scalar, values, jumps)
+    ax = new_axes(ax, solid=True)
     draw_arc(ax, trace, [trace.t, trace.j.astype(float), values], marked, {"label": scalar.name} | line_options)
     ax.set_xlabel(TIME)
     ax.set_ylabel(JUMPS)

@@ -43,7 +43,6 @@ def plot_margin(arc: HybridArc, *names: str, ax: Axes | None = None, **line_opti
     infos = arc.automaton.jumps
     chosen = names or tuple(info.name for info in infos if info.trigger is Trigger.STATE)
     jump_mask(arc, chosen)
-    ax = new_axes(ax)
     trace = Trace(arc)
     margins: dict[str, FloatArray] = {}
     for trigger in Trigger:
@@ -51,6 +50,7 @@ def plot_margin(arc: HybridArc, *names: str, ax: Axes | None = None, **line_opti
         if set(own) & set(chosen):
             rows = trace.function(_margins_of(arc, trigger))
             margins |= dict(zip(own, rows.T, strict=True))
+    ax = new_axes(ax)
     for name in chosen:
         draw_arc(ax, trace, [trace.t, margins[name]], jump_mask(arc, [name]), {"label": name} | line_options)
     ax.axhline(0.0, color="0.5", linewidth=0.6, zorder=0)
