@@ -31,6 +31,9 @@ class BoostConverter(hm.HybridAutomaton):
     load = hm.Parameter(20.0, unit="Ohm", description="resistance of the load")
     duty = hm.Parameter(0.5, description="part of each period with the switch closed, between 0 and 1")
     period = hm.Parameter(50e-6, unit="s", description="switching period")
+    forward = hm.Parameter(
+        1e-6, unit="V", description="voltage at which a blocked diode conducts again, above zero so that it can"
+    )
     closing = hm.Clock("close", description="ticks when the switch closes")
     opening = hm.Clock("open", description="ticks when the switch opens")
     blocking = hm.Clock("block", description="ticks when the diode blocks")
@@ -57,8 +60,8 @@ class BoostConverter(hm.HybridAutomaton):
         return hm.least(-s.current, s.voltage - s.source, 0.5 - abs(s.mode - self.CONDUCTING))
 
     def is_overcome(self, s: hm.Values) -> Value:
-        """The diode is blocked, and the output has fallen to the input's voltage."""
-        return hm.least(s.source - s.voltage, 0.5 - abs(s.mode - self.BLOCKED))
+        """The diode is blocked, and the output has fallen below the input's voltage."""
+        return hm.least(s.source - s.forward - s.voltage, 0.5 - abs(s.mode - self.BLOCKED))
 
     def close(self, s: hm.Values) -> dict[str, Value]:
         """Close the switch, which short-circuits the coil to ground."""
