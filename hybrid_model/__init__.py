@@ -21,6 +21,9 @@ from hybrid_model.solver import Method, Solver
 from hybrid_model.stop import Stop
 from hybrid_model.transitions import Clock, Jump, Priority, TimeEvent
 from hybrid_model.variables import Dimension, DiscreteState, Input, Output, Parameter, State, Values
+from hybrid_model.verify import verify
+from hybrid_model.verify_report import Verification, Violation
+from hybrid_model.verify_subject import Tolerances
 from hybrid_model.zeno import ZenoGuard
 
 __all__ = [
@@ -50,11 +53,15 @@ __all__ = [
     "State",
     "Stop",
     "TimeEvent",
+    "Tolerances",
     "Values",
+    "Verification",
+    "Violation",
     "WiringError",
     "ZenoGuard",
     "greatest",
     "least",
     "load_arc",
     "simulate",
+    "verify",
 ]

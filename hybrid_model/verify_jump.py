@@ -1,0 +1,117 @@
+"""Check the jumps of samples: that one of the automaton's jumps was due, and that it leads to the next sample."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid_model.transitions import Priority, Trigger
+from hybrid_model.variables import FloatArray
+from hybrid_model.verify_flow import nearby
+from hybrid_model.verify_report import Findings
+from hybrid_model.verify_subject import Subject, Tolerances
+
+
+class JumpCheck:
+    """Checks one jump after the other.
+
+    Parameters
+    ----------
+    subject : Subject
+        Automaton and samples.
+    tolerances : Tolerances
+        What counts as equal.
+    findings : Findings
+        Where violations go.
+    """
+
+    def __init__(self, subject: Subject, tolerances: Tolerances, findings: Findings) -> None:
+        self._subject = subject
+        self._tolerances = tolerances
+        self._findings = findings
+
+    def check(self, k: int) -> None:
+        """Check the jump from sample `k` to the next."""
+        infos = self._subject.automaton.jumps
+        lateness = self._lateness(k)
+        enabled = [i for i in range(len(infos)) if lateness[i][1]]
+        landing = [i for i in range(len(infos)) if self._lands(i, k)]
+        taken = [i for i in landing if i in enabled]
+        if not taken:
+            self._report(k, enabled, landing, lateness)
+            return
+        first = next((i for i in enabled if lateness[i][2]), len(infos))
+        if first < taken[0]:
+            self._findings.add(
+                k,
+                6,
+                "order",
+                f"jump {infos[taken[0]].name!r} was taken although {infos[first].name!r}, which comes before it, was "
+                "due.",
+            )
+        if all(infos[i].trigger is Trigger.STATE for i in taken):
+            self._flow_priority(k, infos[taken[0]].name)
+
+    def _lateness(self, k: int) -> list[tuple[float, bool, bool]]:
+        """Return for each jump its margin (for time events the time in s since it was due), and whether it was due
+        within the tolerances, and beyond doubt.
+        """
+        subject, tolerances = self._subject, self._tolerances
+        rows = np.array([subject.jump_margins(*point, k) for point in nearby(subject, k, tolerances.time)])
+        found: list[tuple[float, bool, bool]] = [(0.0, False, False)] * len(subject.automaton.jumps)
+        for index, column in zip(subject.guards, rows.T, strict=True):
+            due = bool(np.max(column) >= -tolerances.atol)
+            found[index] = float(column[0]), due, bool(np.min(column) > tolerances.atol)
+        for index, time in zip(subject.timed, subject.event_times(k), strict=True):
+            since = float(subject.samples.t[k] - time)
+            found[index] = since, since >= -tolerances.time, since >= 0.0
+        return found
+
+    def _difference(self, index: int, k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return where a jump leads, where the samples go, and how much these may differ."""
+        subject = self._subject
+        expected = subject.reset(index, k)
+        found = np.concatenate([subject.x[k + 1], subject.z[k + 1]])
+        allowed = self._tolerances.atol + self._tolerances.rtol * np.maximum(np.abs(found), np.abs(expected))
+        return expected, found, allowed
+
+    def _lands(self, index: int, k: int) -> bool:
+        expected, found, allowed = self._difference(index, k)
+        return bool(np.all(np.abs(found - expected) <= allowed))
+
+    def _report(self, k: int, enabled: list[int], landing: list[int], lateness: list[tuple[float, bool, bool]]) -> None:
+        infos = self._subject.automaton.jumps
+        if enabled:
+            names = self._subject.names
+            expected, found, allowed = self._difference(enabled[0], k)
+            i = int(np.argmax(np.nan_to_num(np.abs(found - expected) / allowed, nan=np.inf)))
+            self._findings.add(
+                k,
+                2,
+                "jump map",
+                f"jump {infos[enabled[0]].name!r} was due and leads to {names[i]} = {expected[i]:.12g}, but the "
+                f"samples go to {found[i]:.12g}.",
+            )
+            return
+        culprits = landing or range(len(infos))
+        why = ", ".join(
+            f"{infos[i].name!r} has margin {lateness[i][0]:.3g}"
+            if infos[i].trigger is Trigger.STATE
+            else f"{infos[i].name!r} is due {-lateness[i][0]:.3g} s later"
+            for i in culprits
+        )
+        rule = 5 if landing and infos[landing[0]].trigger is Trigger.TIME else 3
+        self._findings.add(k, rule, "jump set", f"a jump was taken while none was due: {why or 'there are no jumps'}.")
+
+    def _flow_priority(self, k: int, name: str) -> None:
+        """Under flow priority a jump on state happens only where no flow is possible."""
+        subject = self._subject
+        if subject.automaton.priority is not Priority.FLOW:
+            return
+        margins = [subject.flow_margin(*point, k) for point in nearby(subject, k, self._tolerances.time)]
+        if min(margins) > self._tolerances.atol:
+            self._findings.add(
+                k,
+                2,
+                "priority",
+                f"jump {name!r} was taken with margin {margins[0]:.3g} of the flow set left: flow has priority.",
+            )
