@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import control
 import numpy as np
 
 from hybrid_model.consensus.graphs import weighted_laplacian
@@ -11,9 +10,10 @@ from hybrid_model.consensus.spanning_trees import TreePartition
 from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.tables import ScenarioError
 from hybrid_model.consensus.weights import ConstantWeight
+from hybrid_model.linear import StateSpace, named_system
 
 
-def edge_domain_system(scenario: Scenario, partition: TreePartition | None = None) -> control.StateSpace:
+def edge_domain_system(scenario: Scenario, partition: TreePartition | None = None) -> StateSpace:
     """Return the linear system from the broadcast errors e to the edge states x_e, for constant weights.
 
     With the tree-edge states ``x_tau`` it is ``x_tau' = -k D_tau' L D_tau (D_tau' D_tau)^-1 x_tau - k D_tau' L e`` and
@@ -51,7 +51,7 @@ def edge_domain_system(scenario: Scenario, partition: TreePartition | None = Non
     from_error = -network.gain * tree.incidence_tree.T @ laplacian
     # x = D_tau (D_tau' D_tau)^-1 x_tau, up to the mean, which the Laplacian does not see.
     to_states = tree.incidence_tree @ np.linalg.inv(tree.edge_laplacian_tree)
-    return control.ss(
+    return named_system(
         from_error @ to_states,
         from_error,
         tree.R_by_edge.T,
