@@ -59,6 +59,6 @@ class FlowRecord:
         pieces = [
             replace(piece, t0=max(a, piece.t0), t1=min(b, piece.t1), x0=piece.at(max(a, piece.t0)), x1=piece.at(b))
             for piece in self.pieces
-            if piece.t1 > a and piece.t0 < b
+            if max(a, piece.t0) < min(b, piece.t1)
         ]
         return FlowRecord(a, self.at(a), self.z, tuple(pieces))
