@@ -2,11 +2,15 @@
 
 from dataclasses import dataclass, field
 
+import control
+import numpy as np
+
 import hybrid_model as hm
 import hybrid_model.models
 from hybrid_model.consensus import agents, edges
 from hybrid_model.consensus.network import closed_loop, scenario_agents
 from hybrid_model.consensus.scenario import load_scenario, replace_trigger
+from hybrid_model.linear import lti
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,8 @@ def cases():
         ),
     }
     found |= process_cases()
+    found |= mechanics_cases()
+    found |= linear_cases()
     for kind in ("static", "dynamic"):
         scenario = replace_trigger(paper, kind)
         found[f"paper_{kind}"] = Case(closed_loop(scenario), 20.0)
@@ -72,3 +78,65 @@ def process_cases():
         "switched_feedback": Case(models.SwitchedFeedback(), 20.0),
         "juggled_ball": Case(models.JuggledBall(), 12.0),
     }
+
+
+def mechanics_cases():
+    """Impacts and pulses, many of them at one instant; no event lies on one of the 41 output points."""
+    models = hm.models
+    return {
+        "sawtooth_timer": Case(models.SawtoothTimer(period=0.7), 4.97),
+        "scheduled_sawtooth_timer": Case(models.ScheduledSawtoothTimer(period=0.7, elapsed=0.2), 4.97),
+        "particle_in_box": Case(models.ParticleInBox(), 9.7),
+        "particle_in_corners": Case(models.ParticleInBox(x=0.5, y=0.25, vx=0.3, vy=0.15), 23.7),
+        "ball_on_moving_table": Case(
+            models.BallOnMovingTable(),
+            1.21,
+            {"table": ((0.3, -0.5), (0.9, -0.7)), "table_velocity": ((0.2, 0.8), (0.9, 0.0))},
+        ),
+        "ball_on_oscillating_table": Case(
+            models.BallOnOscillatingTable(table={"amplitude": 0.12753}, h=0.0, v=3.0, e=0.5), 5.93
+        ),
+        "newtons_cradle": Case(models.NewtonsCradle(x=[-0.05, -0.05, 0.0, 0.0, 0.0]), 2.0),
+        "newtons_cradle_unequal": Case(models.NewtonsCradle(x=[-0.05, 0.0, 0.02]), 2.0),
+        "fireflies": Case(models.Fireflies(phase=[0.13, 0.95, 0.62, 0.37]), 6.4),
+        "firefly": Case(models.Firefly(others=2, phase=0.3), 4.0, {"received[2]": ((0.5, 1.0), (1.6, 3.0))}),
+        "firefly_network": Case(models.FireflyNetwork([0.13, 0.95, 0.62]), 6.4),
+    }
+
+
+def linear_cases():
+    """Linear plants under sampled and event-triggered feedback, own and python-control's; no event on an output point."""
+    models = hm.models
+    return {
+        "sampled_lti_loop": Case(models.SampledLtiLoop(), 7.03),
+        "event_triggered_lti_loop": Case(models.EventTriggeredLtiLoop(), 5.0),
+        "control_plant_event_triggered": Case(control_plant_under_triggers(), 6.0),
+        "control_plant_digital_controller": Case(control_plant_under_digital_controller(), 7.01, {"r": ((2.3, 0.4),)}),
+    }
+
+
+def control_plant_under_triggers():
+    """python-control's plant and gain as parts; each of the two sensors sends when its value has moved by 0.02."""
+    plant = control.ss(
+        [[0.0, 1.0], [-2.0, 3.0]], [[0.0], [1.0]], np.eye(2), 0.0, inputs=["u"], outputs=["position", "velocity"]
+    )
+    gain = control.ss([], [], [], [[1.0, -4.0]], inputs=["position", "velocity"], outputs=["u"])
+    parts = {"plant": lti(plant, start=[0.8, -0.3]), "gain": lti(gain)}
+    wires = {"plant.u": "gain.u"}
+    for sensor in ("position", "velocity"):
+        parts[sensor] = agents.StaticTrigger(threshold=0.02)
+        wires |= {f"{sensor}.x": f"plant.{sensor}", f"gain.{sensor}": f"{sensor}.broadcast"}
+    return hm.Composition("control_plant_under_triggers", parts, wires)
+
+
+def control_plant_under_digital_controller():
+    """python-control's transfer functions in a loop: a plant in continuous time, a PI controller that samples."""
+    plant = control.tf([2.0], [1.0, 1.2, 1.0], inputs=["u"], outputs=["y"])
+    controller = control.ss([[1.0]], [[0.2, -0.2]], [[0.9]], [[0.6, -0.6]], 0.2, inputs=["r", "y"], outputs=["u"])
+    parts = {"plant": lti(plant), "controller": lti(controller)}
+    return hm.Composition(
+        "control_plant_under_digital_controller",
+        parts,
+        {"plant.u": "controller.u", "controller.y": "plant.y"},
+        {"controller.r": "r", "plant.y": "y", "controller.u": "u", "controller.x": "integral"},
+    )

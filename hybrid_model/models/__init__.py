@@ -10,6 +10,7 @@ from hybrid_model.models.analog_digital import (
 from hybrid_model.models.ball_on_moving_table import BallOnMovingTable, BallOnOscillatingTable, OscillatingTable
 from hybrid_model.models.boost_converter import BoostConverter
 from hybrid_model.models.bouncing_ball import BouncingBall
+from hybrid_model.models.event_triggered_lti_loop import EventTriggeredFeedback, EventTriggeredLtiLoop
 from hybrid_model.models.fireflies import Fireflies, Firefly, FireflyNetwork
 from hybrid_model.models.juggled_ball import JuggledBall, PeriodController, PushedBall
 from hybrid_model.models.network_estimation import (
@@ -22,6 +23,7 @@ from hybrid_model.models.network_estimation import (
 from hybrid_model.models.newtons_cradle import NewtonsCradle
 from hybrid_model.models.particle_in_box import ParticleInBox
 from hybrid_model.models.relay_hysteresis import RelayHysteresis
+from hybrid_model.models.sampled_lti_loop import LtiPlant, SampledFeedback, SampledLtiLoop
 from hybrid_model.models.sawtooth_timer import SawtoothTimer, ScheduledSawtoothTimer
 from hybrid_model.models.switched_feedback import NormSwitch, StaticFeedback, SwitchedFeedback
 from hybrid_model.models.thermostat import Thermostat
@@ -36,6 +38,8 @@ __all__ = [
     "BallOnOscillatingTable",
     "BoostConverter",
     "BouncingBall",
+    "EventTriggeredFeedback",
+    "EventTriggeredLtiLoop",
     "FiniteStateMachine",
     "Fireflies",
     "Firefly",
@@ -43,6 +47,7 @@ __all__ = [
     "FirstOrderPlant",
     "JuggledBall",
     "LinearProcess",
+    "LtiPlant",
     "NetworkEstimation",
     "NewtonsCradle",
     "NormSwitch",
@@ -51,6 +56,8 @@ __all__ = [
     "PeriodController",
     "PushedBall",
     "RelayHysteresis",
+    "SampledFeedback",
+    "SampledLtiLoop",
     "SawtoothTimer",
     "ScheduledSawtoothTimer",
     "SineSource",
