@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from nbclient import NotebookClient
 
+import hybrid_model as hm
+
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 KERNEL = "this-interpreter"
@@ -80,7 +82,36 @@ def check_from_automaton_to_cosimulation(notebook):
     assert len(figures(notebook)) == 7
 
 
-CHECKS = {"from_automaton_to_cosimulation": check_from_automaton_to_cosimulation}
+def check_hybrid_arcs(notebook):
+    text = printed(notebook)
+    # Impacts of the ball in closed form; each is printed with both sides and both jump counts.
+    flights = np.sqrt(2 / 9.81) * np.array([1.0, *(2.0 * 0.7 ** np.arange(1, 4))])
+    impacts = re.findall(rf"\({NUMBER}, (\d+)\)  ->  \({NUMBER}, (\d+)\)  +{NUMBER} +{NUMBER}\n", text)
+    assert [float(row[0]) for row in impacts] == pytest.approx(np.cumsum(flights), abs=1e-9)  # nine digits are printed
+    for k, (t, j, same_t, next_j, before, after) in enumerate(impacts):
+        assert (same_t, int(j), int(next_j)) == (t, k, k + 1)
+        assert float(after) == pytest.approx(-0.7 * float(before), abs=1e-5)  # five digits are printed
+    # The limit on what the thermostat's period may be off by: located to a few ulp of t, at 0.14 K/s or more.
+    (off,) = numbers(rf"off by at most {NUMBER} s", text)
+    assert off < 1e-10
+    assert "priority JUMP  jumps at [1. 2. 3. 4. 5. 6.] s" in text
+    assert "priority FLOW  jumps at [2. 4. 6.] s" in text
+    (accumulation,) = numbers(rf"accumulate at t = {NUMBER} s", text)
+    (exact,) = numbers(rf"exact: t\* = {NUMBER} s", text)
+    assert exact == pytest.approx(np.sqrt(2 / 9.81) * 1.7 / 0.3, abs=1e-9)
+    # The guard ends the run with a rest of the geometric series below 1e-6 s.
+    assert accumulation == pytest.approx(exact, abs=1e-6)
+    assert all(words in text for words in ("ZENO", hm.Stop.ZENO.value))
+    assert "per agent  [4, 10, 13, 8]" in text
+    bound, shortest = re.findall(rf"lower bound {NUMBER} s, .* {NUMBER} s", text)[0]
+    assert 0.0 < float(bound) < float(shortest)
+    assert len(figures(notebook)) == 8
+
+
+CHECKS = {
+    "from_automaton_to_cosimulation": check_from_automaton_to_cosimulation,
+    "hybrid_arcs": check_hybrid_arcs,
+}
 
 
 def test_every_notebook_has_a_check():

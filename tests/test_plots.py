@@ -406,6 +406,26 @@ def test_a_raster_of_a_run_has_its_jumps_without_breakpoints(arcs, ax):
         assert list(rows.get_positions()) == list(arcs["both"].event_times(name))
 
 
+@pytest.mark.parametrize("plot", [plots.plot_raster, plots.plot_inter_event_times])
+def test_events_are_shown_over_the_whole_run(ax, plot):
+    plot(hm.simulate(Ticker(), 9.9), "tick", ax=ax)
+    low, high = ax.get_xlim()
+    assert -1.0 < low <= 0.0
+    assert 9.9 <= high < 11.0
+
+
+def test_legends_are_above_the_axes(arcs, solid, ax):
+    for axes, draw in ((ax, plots.plot_over_time), (solid, lambda arc, ax: draw_twice(arc, ax))):
+        draw(arcs["ball"], ax=axes)
+        axes.figure.canvas.draw()
+        assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0  # a pixel
+
+
+def draw_twice(arc, ax):
+    for name in ("h", "v"):
+        plots.plot_hybrid_arc(arc, name, ax=ax)
+
+
 def test_a_raster_takes_names_and_options(arcs, ax):
     plots.plot_raster(arcs["both"], "left.break", ax=ax, colors="r", linelengths=0.2)
     (rows,) = ax.collections

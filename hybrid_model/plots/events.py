@@ -50,6 +50,7 @@ def plot_raster(events: Events, *names: str, ax: Axes | None = None, **line_opti
     options: dict[str, Any] = {"linelengths": 0.7, "linewidths": 1.0, "colors": "k"} | line_options
     if times:  # without rows eventplot has no limits to set
         ax.eventplot(list(times.values()), lineoffsets=rows, **options)
+    _show_whole_run(ax, events)
     labels, common = short_names(list(times))
     step = max(1, math.ceil(len(times) / ROWS))
     ax.set_yticks(rows[::step], labels[::step])
@@ -88,16 +89,17 @@ def plot_inter_event_times(
     times = event_times(events, names)
     ax = new_axes(ax)
     ax.set_yscale("log")
-    labels, common = short_names(list(times))
+    labels, _ = short_names(list(times))
     few = len(times) <= LEGEND_ROWS
     for k, (label, row) in enumerate(zip(labels, times.values(), strict=True)):
         own = {"label": label, "marker": MARKERS[k % len(MARKERS)]} if few else {"label": "_", "color": "k"}
         _draw_gaps(ax, row, {"marker": "o", "markersize": 4, "linestyle": "none"} | own | line_options)
+    _show_whole_run(ax, events)
     if bound is not None:
         _make_room(ax, bound, bound)
         ax.axhline(bound, color="0.4", linestyle=(0, (5, 2)), linewidth=1.0, zorder=1.5, label="lower bound")
     ax.set_xlabel(TIME)
-    ax.set_ylabel(f"time since the last {common or 'event'} (s)")
+    ax.set_ylabel("inter-event time (s)")
     legend(ax)
     return ax
 
@@ -120,6 +122,13 @@ def _make_room(ax: Axes, low: float, high: float) -> None:
     # A factor of three: gaps that are equal up to rounding must not fill the axis with their last digits.
     ax.update_datalim([(0.0, low / 3.0), (0.0, high * 3.0)], updatex=False)
     ax.autoscale_view()
+
+
+def _show_whole_run(ax: Axes, events: Events) -> None:
+    # That nothing happens at the end of a run is part of the picture.
+    if isinstance(events, HybridArc):
+        ax.update_datalim([(events.t[0], 1.0), (events.t[-1], 1.0)], updatey=False)
+        ax.autoscale_view()
 
 
 def event_times(events: Events, names: tuple[str, ...]) -> dict[str, FloatArray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -85,9 +86,18 @@ def add_label(present: str, label: str) -> str:
 
 
 def legend(ax: Axes) -> None:
-    """Give axes a legend if they show more than one thing."""
-    if len(ax.get_legend_handles_labels()[0]) > 1:
-        ax.legend()
+    """Give axes that show more than one thing a legend, above them, where it hides no curve."""
+    count = len(ax.get_legend_handles_labels()[0])
+    if count > 1:
+        columns = count if count < 4 else math.ceil(count / math.ceil(count / 4))
+        ax.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            borderaxespad=0.3,
+            ncols=columns,
+            columnspacing=1.2,
+            handlelength=1.4,
+        )
 
 
 def short_names(names: Sequence[str]) -> tuple[list[str], str]:
