@@ -59,7 +59,7 @@ def cases():
 
 
 def process_cases():
-    """Processes, power electronics, and the examples of the HyEQ Toolbox; no event lies on one of the 41 output points."""
+    """Processes, power electronics, and examples of the HyEQ Toolbox; no event lies on one of the 41 output points."""
     models = hm.models
     return {
         "two_tank": Case(models.TwoTank(), 3.99),
@@ -77,6 +77,7 @@ def process_cases():
         "network_estimation": Case(models.NetworkEstimation(), 10.0),
         "switched_feedback": Case(models.SwitchedFeedback(), 20.0),
         "juggled_ball": Case(models.JuggledBall(), 12.0),
+        "ball_and_platform": Case(models.BallAndPlatform(), 8.0),
     }
 
 

@@ -7,6 +7,7 @@ from hybrid_model.models.analog_digital import (
     FirstOrderPlant,
     ZeroOrderHold,
 )
+from hybrid_model.models.ball_and_platform import BallAndPlatform, BallOverPlatform, SpringPlatform
 from hybrid_model.models.ball_on_moving_table import BallOnMovingTable, BallOnOscillatingTable, OscillatingTable
 from hybrid_model.models.boost_converter import BoostConverter
 from hybrid_model.models.bouncing_ball import BouncingBall
@@ -34,8 +35,10 @@ from hybrid_model.models.vehicle_on_path import VehicleOnPath
 __all__ = [
     "AnalogDigitalConverter",
     "AnalogDigitalLoop",
+    "BallAndPlatform",
     "BallOnMovingTable",
     "BallOnOscillatingTable",
+    "BallOverPlatform",
     "BoostConverter",
     "BouncingBall",
     "EventTriggeredFeedback",
@@ -63,6 +66,7 @@ __all__ = [
     "SineSource",
     "SporadicEstimator",
     "SporadicNetwork",
+    "SpringPlatform",
     "StaticFeedback",
     "SwitchedFeedback",
     "Thermostat",
