@@ -4,6 +4,7 @@ from hybrid_model.arc import HybridArc
 from hybrid_model.arc_file import load_arc
 from hybrid_model.automaton import Automaton, HybridAutomaton
 from hybrid_model.compose import Composition
+from hybrid_model.dwell import MinimumDwell
 from hybrid_model.errors import (
     AlgebraicLoopError,
     DataError,
@@ -14,6 +15,7 @@ from hybrid_model.errors import (
 )
 from hybrid_model.execution import Execution, JumpRecord
 from hybrid_model.margins import greatest, least
+from hybrid_model.modes import ModalAutomaton, Mode, Switch, TimedSwitch
 from hybrid_model.samples import Samples
 from hybrid_model.signals import Signal
 from hybrid_model.simulate import simulate
@@ -24,6 +26,7 @@ from hybrid_model.variables import Dimension, DiscreteState, Input, Output, Para
 from hybrid_model.verify import verify
 from hybrid_model.verify_report import Verification, Violation
 from hybrid_model.verify_subject import Tolerances
+from hybrid_model.wiring import feedback, product, series
 from hybrid_model.zeno import ZenoGuard
 
 __all__ = [
@@ -43,6 +46,9 @@ __all__ = [
     "Jump",
     "JumpRecord",
     "Method",
+    "MinimumDwell",
+    "ModalAutomaton",
+    "Mode",
     "Output",
     "Parameter",
     "Priority",
@@ -52,16 +58,21 @@ __all__ = [
     "Solver",
     "State",
     "Stop",
+    "Switch",
     "TimeEvent",
+    "TimedSwitch",
     "Tolerances",
     "Values",
     "Verification",
     "Violation",
     "WiringError",
     "ZenoGuard",
+    "feedback",
     "greatest",
     "least",
     "load_arc",
+    "product",
+    "series",
     "simulate",
     "verify",
 ]

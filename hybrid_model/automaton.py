@@ -212,7 +212,9 @@ class HybridAutomaton(Automaton):
         if (single[0] is None) != (single[1] is None):
             raise DeclarationError(f"{self.name} has one of jump_set and jump_map: write both, or neither.")
         own = (Jump("jump", single[0], single[1]),) if single[0] is not None and single[1] is not None else ()
-        transitions = (*own, *cls.transitions)
+        return self._named_once((*own, *cls.transitions))
+
+    def _named_once(self, transitions: tuple[Jump | TimeEvent, ...]) -> tuple[Jump | TimeEvent, ...]:
         names = [t.name for t in transitions]
         if len(set(names)) < len(names):
             raise DeclarationError(f"{self.name} has two transitions of one name among {names}: rename one.")

@@ -48,7 +48,7 @@ class FlowPiece:
     t1: float
     x0: FloatArray
     x1: FloatArray
-    interpolate: Callable[[float | FloatArray], FloatArray]
+    interpolate: Callable[[Any], FloatArray]
 
     def at(self, t: float) -> FloatArray:
         """Return the continuous states at `t` in [t0, t1]."""

@@ -38,9 +38,10 @@ def _matrices(degree: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the points on [0, 1], and what makes Bernstein and the last two Chebyshev coefficients of samples."""
     k = np.arange(degree + 1)
     points = 0.5 - 0.5 * np.cos(np.pi * k / degree)
-    bernstein: FloatArray = comb(degree, k) * points[:, None] ** k * (1.0 - points[:, None]) ** (degree - k)
+    bernstein = comb(degree, k) * points[:, None] ** k * (1.0 - points[:, None]) ** (degree - k)
     chebyshev = np.polynomial.chebyshev.chebvander(2.0 * points - 1.0, degree)
-    return points, np.linalg.inv(bernstein), np.asarray(np.linalg.inv(chebyshev)[-2:], dtype=np.float64)
+    to_bernstein, to_chebyshev = (np.linalg.inv(np.asarray(m, dtype=np.float64)) for m in (bernstein, chebyshev))
+    return points, to_bernstein, to_chebyshev[-2:]
 
 
 POINTS, TO_BERNSTEIN, TO_TAIL = _matrices(DEGREE)

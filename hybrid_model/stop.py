@@ -8,8 +8,8 @@ class Stop(enum.Enum):
 
     HORIZON = "The end time was reached."
     ZENO = (
-        "Jumps accumulate: end the run before the accumulation time, give the jump set a minimum dwell time, "
-        "or model what happens after the accumulation as a mode of its own."
+        "Jumps accumulate: end the run before the accumulation time, give the automaton a minimum dwell time "
+        "(MinimumDwell), or model what happens after the accumulation as a mode of its own."
     )
     JUMPS = (
         "The budget of jumps is used up: raise ZenoGuard.max_jumps if so many are right; else look for events that "

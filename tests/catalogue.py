@@ -27,6 +27,8 @@ def cases():
     paper = load_scenario("paper-a")
     found = {
         "bouncing_ball": Case(hm.models.BouncingBall(h=1.0), 2.4),
+        "resting_ball": Case(hm.models.RestingBall(slowest=0.3), 3.0),
+        "bouncing_ball_with_dwell": Case(hm.MinimumDwell(hm.models.BouncingBall(), 0.05), 3.0),
         "thermostat": Case(hm.models.Thermostat(), 150.0),
         "integrator": Case(
             agents.Integrator(degree=2, x=1.0, weights=[1.0, 0.5]),

@@ -24,6 +24,7 @@ from hybrid_model.models.network_estimation import (
 from hybrid_model.models.newtons_cradle import NewtonsCradle
 from hybrid_model.models.particle_in_box import ParticleInBox
 from hybrid_model.models.relay_hysteresis import RelayHysteresis
+from hybrid_model.models.resting_ball import RestingBall
 from hybrid_model.models.sampled_lti_loop import LtiPlant, SampledFeedback, SampledLtiLoop
 from hybrid_model.models.sawtooth_timer import SawtoothTimer, ScheduledSawtoothTimer
 from hybrid_model.models.switched_feedback import NormSwitch, StaticFeedback, SwitchedFeedback
@@ -59,6 +60,7 @@ __all__ = [
     "PeriodController",
     "PushedBall",
     "RelayHysteresis",
+    "RestingBall",
     "SampledFeedback",
     "SampledLtiLoop",
     "SawtoothTimer",
