@@ -108,7 +108,7 @@ def mechanics_cases():
 
 
 def linear_cases():
-    """Linear plants under sampled and event-triggered feedback, own and python-control's; no event on an output point."""
+    """Linear plants under sampled and event-triggered feedback; no event lies on one of the output points."""
     models = hm.models
     return {
         "sampled_lti_loop": Case(models.SampledLtiLoop(), 7.03),
