@@ -130,16 +130,7 @@ def _content(path: Path) -> Table:
                 return {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise
-    except (
-        zipfile.BadZipFile,
-        zlib.error,
-        OSError,
-        EOFError,
-        ValueError,
-        AttributeError,
-        TypeError,
-        KeyError,
-    ) as error:
+    except UNREADABLE as error:
         raise DataError(
             f"{path} is no hybrid arc, or is damaged ({error}): give a file that HybridArc.save wrote completely."
         ) from error
@@ -216,6 +207,7 @@ def _arc(content: Table) -> HybridArc:
     about = json.loads(content["about"].tobytes().decode())
     automaton = _automaton(about, content["start_values"])
     read = RecordedValues(automaton, content["parameters"], content["interpolation_error"])
+    _require_lengths(content, sum(read.layout.sizes[kind] for kind in (Kind.STATE, Kind.INPUT, Kind.OUTPUT)))
     flows = _flows(content)
     first = int(content["j"][0])
     sides = [content[f"jump_{side}"] for side in ("x_before", "z_before", "x_after", "z_after")]
@@ -223,9 +215,6 @@ def _arc(content: Table) -> HybridArc:
         JumpRecord(float(t), first + k, int(index), automaton.jumps[index].name, *row)
         for k, (t, index, *row) in enumerate(zip(content["jump_t"], content["jump_index"], *sides, strict=True))
     ]
-    width = sum(read.layout.sizes[kind] for kind in (Kind.STATE, Kind.INPUT, Kind.OUTPUT))
-    if len(flows) != len(jumps) + 1 or content["channels"].shape[1] != width:
-        raise ValueError(f"{len(flows)} flows, {len(jumps)} jumps, {content['channels'].shape[1]} of {width} columns")
     return HybridArc.recorded(
         read,
         flows,
@@ -235,6 +224,26 @@ def _arc(content: Table) -> HybridArc:
         event_tolerance=float(content["event_tolerance"]),
         first_j=first,
     )
+
+
+def _require_lengths(content: Table, width: int) -> None:
+    samples, parts = len(content["t"]), len(content["part_ends"])
+    flows = int(content["j"][-1]) - int(content["j"][0]) + 1
+    shapes = {
+        "j": (samples,),
+        "channels": (samples, width),
+        "interpolation_error": (width,),
+        "jump_t": (flows - 1,),
+        "piece_parts": (samples - flows,),
+        "part_ends": (int(np.sum(content["piece_parts"])), 2),
+        "part_points": (parts,),
+        "points": (int(np.sum(content["part_points"])), width),
+    }
+    for name, shape in shapes.items():
+        if content[name].shape != shape:
+            raise ValueError(f"{name} has shape {content[name].shape} in place of {shape}")
+    if len(content["discrete"]) != flows:
+        raise ValueError(f"{len(content['discrete'])} rows of discrete states for {flows} flows")
 
 
 def _flows(content: Table) -> list[FlowRecord]:

@@ -57,10 +57,13 @@ class Interpolant:
 
     parts: tuple[Polynomial, ...]
 
-    def __call__(self, t: float) -> FloatArray:
-        """Return the value at `t`, shape (m,)."""
+    def __call__(self, t: float | FloatArray) -> FloatArray:
+        """Return the value at a time, shape (m,), or at times, shape (m, times), as dense outputs do."""
+        if isinstance(t, np.ndarray) and t.ndim:
+            width = self.parts[0].values.shape[1]
+            return np.array([self(float(time)) for time in t]).reshape(len(t), width).T
         at = bisect.bisect_left(self.parts, t, key=lambda part: part.b)
-        return self.parts[min(at, len(self.parts) - 1)](t)
+        return self.parts[min(at, len(self.parts) - 1)](float(t))
 
 
 def interpolate(
@@ -116,12 +119,12 @@ def _halved(
     """Halve the interval of a polynomial for as long as that makes it better."""
     whole, error = fitted
     middle = 0.5 * (whole.a + whole.b)
-    excess = np.max(error / tolerance)
+    excess = np.max(error / tolerance, initial=0.0)
     # Written so that a value that is not a number ends it.
     if not excess > 1.0 or depth == 0 or not whole.a < middle < whole.b:
         return [whole], error
     halves = [_fit(function, a, b, tolerance) for a, b in ((whole.a, middle), (middle, whole.b))]
-    if all(np.max(rest / tolerance) > GAIN * excess for _, rest in halves):
+    if all(np.max(rest / tolerance, initial=0.0) > GAIN * excess for _, rest in halves):
         return [whole], error
     parts, errors = zip(*(_halved(function, half, tolerance, depth - 1) for half in halves), strict=True)
     return [*parts[0], *parts[1]], np.maximum(*errors)
