@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: run test test-long lint format clean
+.PHONY: run test test-long benchmark lint format clean
 
 run: $(READY)
 	$(BIN)/hybrid-fmu paper --out results
@@ -14,6 +14,11 @@ test: lint
 
 test-long: $(READY)
 	$(BIN)/python -m pytest -n 2 -m long
+
+# Prints the tables of docs/benchmarks.md.
+benchmark: $(READY)
+	PIP_CONSTRAINT=constraints.txt $(BIN)/pip install --quiet --disable-pip-version-check -e ".[benchmark]"
+	PYTHONPATH=tests $(BIN)/python -m benchmarks
 
 lint: $(READY)
 	$(BIN)/ruff format --check .

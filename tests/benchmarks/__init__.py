@@ -1,0 +1,1 @@
+"""Event-exact runs by several tools on problems with exact event times; ``make benchmark`` prints the tables."""

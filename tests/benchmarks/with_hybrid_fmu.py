@@ -1,0 +1,85 @@
+"""This project: `simulate` on the automaton, on the compiled automaton, and FMUs under the event-exact master."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import hybrid_model as hm
+from cosim.consensus import fmu_system, network_report
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_event_exact
+from cosim.result import Ended
+from cosim.system import System
+from fmu.export import export_fmu
+from hybrid_model.consensus.network import closed_loop, scenario_agents
+from hybrid_model.models import BouncingBall
+
+from .problems import Consensus, Outcome
+
+
+def automaton_of(problem):
+    if isinstance(problem, Consensus):
+        return closed_loop(problem.scenario)
+    return BouncingBall(h=problem.height, g=problem.gravity, e=problem.restitution)
+
+
+def event_names(problem):
+    if isinstance(problem, Consensus):
+        names = [jump.name for jump in closed_loop(problem.scenario).jumps]
+        return [
+            next(n for n in names if n.startswith(f"agent{i}.") and n.endswith("broadcast")) for i in _agents(problem)
+        ]
+    return ["jump"]
+
+
+def simulate(problem, tolerance):
+    return _simulated(problem, automaton_of(problem), tolerance)
+
+
+def simulate_compiled(problem, tolerance):
+    from fmu.compiled import compiled
+
+    return _simulated(problem, compiled(automaton_of(problem)), tolerance)
+
+
+def _simulated(problem, automaton, tolerance):
+    names = event_names(problem)
+    states = [f"agent{i}.x" for i in _agents(problem)] if isinstance(problem, Consensus) else ["h", "v"]
+    solver = hm.Solver(rtol=tolerance, atol=tolerance / 100)
+
+    def run():
+        arc = hm.simulate(automaton, problem.t_end, solver=solver)
+        x_end = np.array([float(arc.end[name]) for name in states])
+        ended = "end time" if arc.stop is hm.Stop.HORIZON else f"{arc.stop.name}: {arc.message}"
+        return Outcome([arc.event_times(name) for name in names], x_end, float(arc.t[-1]), ended)
+
+    return run
+
+
+def co_simulate(problem, tolerance):
+    """The FMUs integrate with their own tolerance, whatever is asked for."""
+    folder = tempfile.TemporaryDirectory()
+    if isinstance(problem, Consensus):
+        agents = scenario_agents(problem.scenario)
+        fmus = {name: export_fmu(agent, Path(folder.name) / f"{name}.fmu") for name, agent in agents.items()}
+    else:
+        fmus = {"ball": export_fmu(automaton_of(problem), Path(folder.name) / "ball.fmu")}
+
+    def run(_keep=folder):
+        if isinstance(problem, Consensus):
+            result = run_event_exact(fmu_system(problem.scenario, fmus), problem.t_end)
+            report = network_report(problem.scenario, result)
+            events, x_end = report.event_times, report.x_end
+        else:
+            result = run_event_exact(System([FmuSlave("ball", fmus["ball"])], {}), problem.t_end)
+            events = [result.tick_times("ball", "impact")]
+            x_end = np.array([result.final["ball.h"], result.final["ball.v"]])
+        ended = "end time" if result.ended is Ended.HORIZON else f"{result.ended.name}: {result.message}"
+        return Outcome(events, x_end, result.t, ended)
+
+    return run
+
+
+def _agents(problem):
+    return range(1, problem.scenario.network.agents + 1)
