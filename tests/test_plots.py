@@ -43,6 +43,16 @@ class Vector(hm.HybridAutomaton):
         return {"w": np.array([1.0, -1.0])}
 
 
+class Drift(hm.HybridAutomaton):
+    """Two states and no jump at all."""
+
+    x = hm.State(0.0)
+    y = hm.State(1.0)
+
+    def flow_map(self, s):
+        return {"x": s.y, "y": -s.x}
+
+
 class Cascade(hm.HybridAutomaton):
     """At t = 1 s three jumps of one instant: n goes 0, 1, 2, 3."""
 
@@ -87,6 +97,7 @@ def runs():
     return {
         "ball": hm.simulate(BouncingBall(), 2.0),
         "no jumps": hm.simulate(BouncingBall(), 0.1),
+        "no jump declared": hm.simulate(Drift(), 1.0),
         "an instant": hm.simulate(BouncingBall(), 0.0),
         "cascade": hm.simulate(Cascade(), 2.0),
         "both": hm.simulate(both, 2.5),

@@ -54,7 +54,7 @@ def plot_raster(events: Events, *names: str, ax: Axes | None = None, **line_opti
     labels, common = short_names(list(times))
     step = max(1, math.ceil(len(times) / ROWS))
     ax.set_yticks(rows[::step], labels[::step])
-    ax.set_ylim(len(times) - 0.5, -0.5)
+    ax.set_ylim(max(len(times), 1) - 0.5, -0.5)
     ax.set_xlabel(TIME)
     ax.set_ylabel(common)
     return ax
