@@ -89,3 +89,17 @@ def test_with_more_inflow_than_outflow_the_gaps_grow_and_the_run_reaches_its_end
     assert arc.stop is hm.Stop.HORIZON
     # The times reach some hundreds of seconds.
     assert [jump.t for jump in arc.jumps] == pytest.approx(exact[:, 0], rel=ROUNDING)
+
+
+def test_with_a_minimum_dwell_time_the_run_goes_on_past_the_accumulation():
+    # The temporal regularisation of Johansson et al., section 4: past 4 s the inflow alternates with the dwell time,
+    # both tanks sink below their levels, on the average at half the net outflow.
+    dwell = 0.05
+    arc = hm.simulate(hm.MinimumDwell(TwoTank(), dwell), 8.0)
+    assert arc.stop is hm.Stop.HORIZON
+    late = np.array([jump.t for jump in arc.jumps if jump.t > 4.0])
+    assert np.diff(late) == pytest.approx(dwell, abs=1e-9)
+    assert arc["x1"] + arc["x2"] == pytest.approx(1.0 - 0.25 * arc.t, abs=1e-11)
+    # Within what flows in during one dwell time.
+    assert [arc.end.x1, arc.end.x2] == pytest.approx([-0.5, -0.5], abs=0.75 * dwell)
+    assert arc.end.held_jumps >= len(late)
