@@ -93,8 +93,8 @@ def mechanics_cases():
         "particle_in_corners": Case(models.ParticleInBox(x=0.5, y=0.25, vx=0.3, vy=0.15), 23.7),
         "ball_on_moving_table": Case(
             models.BallOnMovingTable(),
-            1.21,
-            {"table": ((0.3, -0.5), (0.9, -0.7)), "table_velocity": ((0.2, 0.8), (0.9, 0.0))},
+            2.41,
+            {"table": ((0.1, 0.2), (0.6, -0.3)), "table_velocity": ((0.2, 0.5), (0.7, 0.0), (1.3, -0.2))},
         ),
         "ball_on_oscillating_table": Case(
             models.BallOnOscillatingTable(table={"amplitude": 0.12753}, h=0.0, v=3.0, e=0.5), 5.93
@@ -102,7 +102,7 @@ def mechanics_cases():
         "newtons_cradle": Case(models.NewtonsCradle(x=[-0.05, -0.05, 0.0, 0.0, 0.0]), 2.0),
         "newtons_cradle_unequal": Case(models.NewtonsCradle(x=[-0.05, 0.0, 0.02]), 2.0),
         "fireflies": Case(models.Fireflies(phase=[0.13, 0.95, 0.62, 0.37]), 6.4),
-        "firefly": Case(models.Firefly(others=2, phase=0.3), 4.0, {"received[2]": ((0.5, 1.0), (1.6, 3.0))}),
+        "firefly": Case(models.Firefly(others=2, phase=0.23), 4.0, {"received[2]": ((0.5, 1.0), (1.6, 3.0))}),
         "firefly_network": Case(models.FireflyNetwork([0.13, 0.95, 0.62]), 6.4),
     }
 

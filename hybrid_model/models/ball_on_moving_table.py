@@ -62,8 +62,9 @@ class BallOnOscillatingTable(hm.Composition):
     With one impact in every n periods of the table the flights last ``T = 2 pi n/rate`` and the ball rebounds with
     ``g T/2``. Such a motion exists where the table's velocity at the impacts is ``w = (1 - e)/(1 + e) g T/2``, which is
     at the angle ``acos(w/(amplitude rate))``. It attracts when the table's deceleration there is positive and less
-    than ``2 g (1 + e**2)/(1 + e)**2``. Sources: P. J. Holmes, J. Sound Vib. 84(2), 173-189 (1982), for the limit of high
-    bounces; Luck and Mehta, Phys. Rev. E 48, 3988 (1993), for the impact times without that limit.
+    than ``2 g (1 + e**2)/(1 + e)**2``. The start values are not on it: a ball may also lose its bounces on the way and
+    settle on the table, which ends the run as Zeno. Sources: P. J. Holmes, J. Sound Vib. 84(2), 173-189 (1982), for the
+    limit of high bounces; Luck and Mehta, Phys. Rev. E 48, 3988 (1993), for the impact times without that limit.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ class BallOnOscillatingTable(hm.Composition):
     """
 
     def __init__(
-        self, name: str = "BallOnOscillatingTable", *, table: dict[str, float] | None = None, **ball: Any
+        self, name: str = "BallOnOscillatingTable", *, table: dict[str, Any] | None = None, **ball: Any
     ) -> None:
         names = {f"ball.{item}": item for item in ("h", "v", "g", "e", "impact")}
         super().__init__(

@@ -17,8 +17,8 @@ class NewtonsCradle(hm.HybridAutomaton):
     Balls that touch at rest must not be in the jump set, or they would hit for ever. An impact therefore needs an
     approach faster than `resting_speed`. Balls closer than `touching` are in contact: rounding gives balls that swing
     together distances of some 1e-17 m, which must not tear a cascade apart. An impact is early by `touching` over the
-    approach speed. Choose ``rate * touching < resting_speed < rate * 1e-9 m``: balls at rest within `touching` then do
-    not hit, and balls that approach without a hit overlap by less than the tolerance of the flow set (rule 3).
+    approach speed, and leaves the balls displaced by up to `touching`. With ``rate * touching < resting_speed`` balls
+    that rest so do not hit, and no two overlap by more than ``2 touching + resting_speed/rate``, the flow set's border.
 
     The impact sequence follows Newton's sequential model (Glocker and Aeberhard, The geometry of Newton's cradle, in
     Nonsmooth Mechanics and Analysis, 2006); an experiment shows a small spread that this model leaves out.
@@ -38,8 +38,8 @@ class NewtonsCradle(hm.HybridAutomaton):
         return {"x": s.v, "v": -(s.rate**2) * s.x}
 
     def flow_set(self, s: hm.Values) -> Value:
-        """No ball overlaps the next."""
-        return np.min(s.x[1:] - s.x[:-1])
+        """No ball overlaps the next, apart from what counts as rest in contact."""
+        return np.min(s.x[1:] - s.x[:-1]) + 2.0 * s.touching + s.resting_speed / s.rate
 
     def pairs(self, s: hm.Values) -> Value:
         """Margin of each pair of neighbours: in contact, and approaching."""
