@@ -17,7 +17,7 @@ from hybrid_model.errors import DeclarationError
 from hybrid_model.frozen_point import FrozenPoint, find_places, outputs_of_flow, read_outputs
 from hybrid_model.jacobian import jacobian
 from hybrid_model.state_space import LinearAutomaton, state_space
-from hybrid_model.variables import FloatArray, Kind, Values, element_names, unknown_name
+from hybrid_model.variables import FloatArray, Kind, Values, element_names, start_array, unknown_name
 
 StateSpace: TypeAlias = control.StateSpace
 """python-control's class, for annotations."""
@@ -124,7 +124,7 @@ def linearise(
     layout = point.layout
     for name, value in (at or {}).items():
         if name == "t":
-            point.t = float(np.asarray(value))
+            point.t = float(start_array(f"{automaton.name}: t", value))
         else:
             point.put(name, value)
     driven = layout.places[Kind.INPUT] if inputs is None else find_places(layout, inputs, (Kind.INPUT, Kind.DISCRETE))
