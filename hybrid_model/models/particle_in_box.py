@@ -19,7 +19,7 @@ class ParticleInBox(hm.HybridAutomaton):
     x = hm.State(0.5, unit="m", description="position along the width", output=True)
     y = hm.State(0.5, unit="m", description="position along the height", output=True)
     vx = hm.State(1.0, unit="m/s", description="velocity along the width", output=True)
-    vy = hm.State(0.6, unit="m/s", description="velocity along the height", output=True)
+    vy = hm.State(0.7, unit="m/s", description="velocity along the height", output=True)
     width = hm.Parameter(2.0, unit="m", description="width of the box")
     height = hm.Parameter(1.0, unit="m", description="height of the box")
     hit_left = hm.Clock("left", description="ticks with each hit on the wall x = 0")
