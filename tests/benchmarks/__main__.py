@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import platform
+from collections.abc import Iterator
 from importlib import metadata
+from pathlib import Path
 
 from .contenders import CONTENDERS
 from .measure import ROUNDS, Entry, choose, fastest_scipy, take_times
 from .problems import PROBLEMS, ZENO_PROBLEM
 
+MARK = "<!-- tables -->"
 ZENO_TOLERANCE = 1e-9
 COLUMNS = (
     "contender",
@@ -28,15 +31,29 @@ PACKAGES = ("numpy", "scipy", "pathsim", "scikit-sundae", "casadi", "fmpy")
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--rounds", type=int, default=ROUNDS, help="timed runs of each contender (default %(default)s)")
-    rounds = parser.parse_args().rounds
-    print(versions(), flush=True)
+    parser.add_argument("--write", type=Path, help=f"text file in which to replace what follows the line {MARK}")
+    options = parser.parse_args()
+    parts = []
+    for part in report(options.rounds):
+        print(part, flush=True)
+        parts.append(part)
+    if options.write:
+        text, mark, _ = options.write.read_text(encoding="utf-8").partition(MARK)
+        if not mark:
+            parser.error(f"{options.write} has no line {MARK}: write it where the tables are to be.")
+        options.write.write_text(text + mark + "\n" + "\n".join(parts) + "\n", encoding="utf-8")
+
+
+def report(rounds: int) -> Iterator[str]:
+    yield versions()
     for problem in PROBLEMS:
-        print(f"\n## {problem.title}: {sum(map(len, problem.exact.events))} events")
-        by_target = list(zip(*[choose(c, problem, problem.targets) for c in CONTENDERS if c.installed], strict=True))
-        for target, entries in zip(problem.targets, by_target, strict=True):
-            take_times(list(entries), rounds)
-            print(f"\nAll event times within {target:.0e} s:\n\n{table(list(entries))}", flush=True)
-    print(f"\n## {ZENO_PROBLEM.title}\n\n{zeno_table()}")
+        yield f"\n### {problem.title}\n{sum(map(len, problem.exact.events))} events."
+        chosen = [choose(contender, problem, problem.targets) for contender in CONTENDERS if contender.installed]
+        for k, target in enumerate(problem.targets):
+            entries = [by_target[k] for by_target in chosen]
+            take_times(entries, rounds)
+            yield f"\nAll event times within {target:.0e} s:\n\n{table(entries)}"
+    yield f"\n### {ZENO_PROBLEM.title}\nTolerance {ZENO_TOLERANCE:.0e}.\n\n{zeno_table()}"
 
 
 def versions() -> str:
