@@ -20,8 +20,8 @@ class NewtonsCradle(hm.HybridAutomaton):
     approach speed, and leaves the balls displaced by up to `touching`. With ``rate * touching < resting_speed`` balls
     that rest so do not hit, and no two overlap by more than ``2 touching + resting_speed/rate``, the flow set's border.
 
-    The impact sequence follows Newton's sequential model (Glocker and Aeberhard, The geometry of Newton's cradle, in
-    Nonsmooth Mechanics and Analysis, 2006); an experiment shows a small spread that this model leaves out.
+    One pair at a time is one of several impact laws for a row in contact; Glocker and Aeberhard compare them (The
+    geometry of Newton's cradle, in Nonsmooth Mechanics and Analysis, 2006).
     """
 
     balls = hm.Dimension("number of balls, two or more")

@@ -9,7 +9,7 @@ class ParticleInBox(hm.HybridAutomaton):
 
     Reflections unfold: ``x(t)`` is the triangle wave of ``x(0) + vx(0) t`` between 0 and `width`, likewise y, and the
     walls are hit where that sum is a whole multiple of the width (Tabachnikov, Geometry and Billiards, 2005,
-    chapter 1). In a corner two jumps are due at one instant; they are taken one after the other in the order of
+    chapter 2). In a corner two jumps are due at one instant; they are taken one after the other in the order of
     declaration, each turns one component of the velocity, and the order has no influence on the result.
 
     A point that slides along a wall, with no speed across it, is on the border of the jump set for ever and is refused

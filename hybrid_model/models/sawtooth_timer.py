@@ -8,7 +8,8 @@ class SawtoothTimer(hm.HybridAutomaton):
     """A timer with ``elapsed' = 1`` that is set back to zero when it reaches its period: a jump on the state.
 
     Started at zero at time 0 it expires at ``k period``, k = 1, 2, ...; `ScheduledSawtoothTimer` is the same signal
-    with jumps on time. Source: Goebel, Sanfelice, Teel, Hybrid Dynamical Systems (2012), section 1.1, timers as states.
+    with jumps on time. A timer as a state is how Goebel, Sanfelice and Teel (Hybrid Dynamical Systems, 2012) put time
+    into the flow and jump sets.
     """
 
     elapsed = hm.State(0.0, unit="s", description="time since the timer last expired", output=True)
