@@ -9,16 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from hybrid_model.errors import DeclarationError, SimulationError
 from hybrid_model.variables import FloatArray
 
+FIRST = np.pi / 28.0
+"""The longest step, in units of the variable's size (at least 1). No simple fraction: over whole periods a periodic map
+shows no slope."""
 STEPS = 26
-"""Halvings of the step, from an eighth of the variable's size (at least 1) down to about 4e-9 of it: the first steps
-suit smooth maps, whose rounding errors are then small, the last ones a map with a kink close by."""
+"""Steps, each half the one before, down to about 3e-9 of the variable's size: the first ones suit smooth maps, whose
+rounding errors are then small, the last ones a map with a kink close by."""
+WITNESSES = 3
+"""The shortest steps, whose differences a slope must not contradict."""
 ORDER = 6
 """Columns of an extrapolation table: with six the error of a smooth map falls with the 12th power of the step."""
+EVEN: FloatArray = 4.0 ** np.arange(1.0, ORDER)
+ODD: FloatArray = 2.0 ** np.arange(1.0, 2 * ORDER - 2, 2)
+"""By what the error terms fall when the step is halved: of central differences, and of those of one-sided slopes."""
 KINK = 100.0
 """One-sided slopes that differ by more than this many times the estimated error (and by more than 1e-6 of the slope)
 differ."""
@@ -85,15 +92,15 @@ def _column(
     rows: Sequence[str],
     variable: str,
 ) -> FloatArray:
-    # Powers of two, so that steps and the points they lead to are exact wherever the point allows it.
-    first = 2.0 ** np.round(np.log2(max(1.0, abs(point[k])) / 8.0))
-    steps = first * 0.5 ** np.arange(STEPS)
-    ahead, behind = (np.array([function(_moved(point, k, side * h)) for h in steps]) for side in (1.0, -1.0))
+    steps = FIRST * max(1.0, abs(point[k])) * 0.5 ** np.arange(STEPS)
+    ends = np.array([point[k] + steps, point[k] - steps])
+    ahead, behind = (np.array([function(_moved(point, k, end)) for end in side]) for side in ends)
+    width = (ends[0] - ends[1])[:, None]  # as the rounded ends have it
     size = np.maximum(np.maximum(np.abs(ahead), np.abs(behind)), np.abs(here))
-    noise = np.finfo(np.float64).eps * size / steps[:, None]
-    central = (ahead - behind) / (2.0 * steps[:, None])
-    slope, error = _limit(central, noise, 4.0 ** np.arange(1, ORDER))
-    kink, doubt = _limit((ahead - 2.0 * here + behind) / steps[:, None], noise, 2.0 ** np.arange(1, 2 * ORDER - 2, 2))
+    noise = 2.0 * np.finfo(np.float64).eps * size / width
+    central = (ahead - behind) / width
+    slope, error = _settled(central, noise, EVEN)
+    kink, doubt = _settled(2.0 * (ahead - 2.0 * here + behind) / width, noise, ODD)
     for row, name in enumerate(rows):
         what = f"{owner}: {name} has no derivative with respect to {variable} at {variable} = {point[k]:.9g}"
         if not np.isfinite(error[row]):
@@ -113,10 +120,28 @@ def _column(
     return slope
 
 
-def _moved(point: FloatArray, k: int, step: float) -> FloatArray:
+def _moved(point: FloatArray, k: int, value: float) -> FloatArray:
     moved = point.copy()
-    moved[k] += step
+    moved[k] = value
     return moved
+
+
+def _settled(column: FloatArray, noise: FloatArray, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the limits of differences for step zero, and their estimated errors.
+
+    Long steps may agree on a limit that is not the one at the point: they reach over what happens close to it. The
+    shortest ones are the witnesses, inaccurate but near: steps are left out from the long end until both agree.
+    """
+    limit, error = _limit(column, noise, factors)
+    scale = np.max(np.abs(np.where(np.isfinite(column), column, 0.0)), axis=0)
+    for first in range(1, STEPS - ORDER):
+        allowed = KINK * noise[-WITNESSES:] + ACCURACY * (np.abs(limit) + scale)
+        wrong = np.any(np.abs(column[-WITNESSES:] - limit) > allowed, axis=0)
+        if not np.any(wrong):
+            break
+        nearer, its_error = _limit(column[first:], noise[first:], factors)
+        limit, error = np.where(wrong, nearer, limit), np.where(wrong, its_error, error)
+    return limit, error
 
 
 def _largest(differences: FloatArray) -> float:
@@ -125,7 +150,7 @@ def _largest(differences: FloatArray) -> float:
     return float(abs(finite[0])) if finite.size else 0.0
 
 
-def _limit(column: FloatArray, noise: FloatArray, factors: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _limit(column: FloatArray, noise: FloatArray, factors: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the limits for step zero of sequences over halved steps, and their estimated errors.
 
     Each further column of the table removes one power of the step, which falls by its factor from row to row. The
@@ -133,7 +158,7 @@ def _limit(column: FloatArray, noise: FloatArray, factors: npt.ArrayLike) -> tup
     """
     best, error = column[0], np.full(column.shape[1], np.inf)
     previous = column
-    for factor in np.atleast_1d(factors):
+    for factor in factors:
         table = previous[1:] + (previous[1:] - previous[:-1]) / (factor - 1.0)
         noise = noise[1:]
         change = np.maximum(np.abs(table - previous[1:]), np.abs(table - previous[:-1])) + noise

@@ -22,6 +22,7 @@ SMOOTH = {
     "pole near by": (lambda x: 1.0 / x, lambda x: -1.0 / x**2, (0.01, 0.3, -5.0)),
     "logarithm": (lambda x: np.log(x), lambda x: 1.0 / x, (0.02, 1.0, 1e5)),
     "steep": (lambda x: np.tanh(200.0 * x), lambda x: 200.0 / np.cosh(200.0 * x) ** 2, (0.0, 0.003)),
+    "whole periods": (lambda x: np.sin(2 * np.pi * x), lambda x: 2 * np.pi * np.cos(2 * np.pi * x), (8.0, 64.0, 8.125)),
     "small numbers": (lambda x: 1e-9 * np.sin(x), lambda x: 1e-9 * np.cos(x), (0.3,)),
 }
 
@@ -32,6 +33,15 @@ def test_derivatives_of_smooth_functions(name):
     function, exact, points = SMOOTH[name]
     for point in points:
         assert derivative(function, point) == pytest.approx(exact(point), rel=1e-10)
+
+
+@pytest.mark.parametrize("width", [1e-2, 1e-4, 1e-6])
+def test_what_happens_close_to_the_point_only_is_seen(width):
+    """Longer steps all say slope zero, and agree."""
+    assert derivative(lambda x: np.where(np.abs(x) < width, x, 0.0), 0.0) == pytest.approx(1.0, rel=1e-9)
+    assert derivative(lambda x: x * np.exp(-((x / width) ** 2)), 0.0) == pytest.approx(1.0, rel=1e-9)
+    with pytest.raises(hm.DeclarationError, match="kink, with the slopes -1 below and 1 above"):
+        derivative(lambda x: np.where(np.abs(x) < width, np.abs(x), 0.0), 0.0)
 
 
 def test_affine_functions_are_exact_to_rounding():
@@ -78,3 +88,27 @@ def test_points_without_finite_values_are_refused():
         derivative(lambda x: np.sqrt(x), -1.0)
     with pytest.raises(hm.SimulationError, match="finite on one side only"):
         derivative(lambda x: np.sqrt(x) ** 3, 0.0)
+
+
+def test_random_smooth_functions_over_six_orders_of_scale():
+    """Waves, bumps and slopes: none is refused, and each is accurate as far as its phase is known in floats."""
+    rng = np.random.default_rng(0)
+    for _ in range(500):
+        rate, width = 10.0 ** rng.uniform(-3.0, 3.0), 10.0 ** rng.uniform(-3.0, 2.0)
+        wave, bump, slope = rng.normal(size=3) * 10.0 ** rng.uniform(-3.0, 3.0, 3)
+        x0 = rng.choice([0.0, rng.normal(), 1e3 * rng.normal(), float(rng.integers(-50, 50))])
+        middle = x0 + width * rng.normal()
+        exact = (
+            wave * rate * np.cos(rate * x0)
+            - 2.0 * bump * (x0 - middle) / width**2 * np.exp(-(((x0 - middle) / width) ** 2))
+            + slope
+        )
+        found = derivative(
+            lambda x, a=wave, w=rate, b=bump, c=middle, s=width, d=slope: (
+                a * np.sin(w * x) + b * np.exp(-(((x - c) / s) ** 2)) + d * x
+            ),
+            x0,
+        )
+        # A phase of up to 1e6 has rounding errors of 1e-10, on steps of a fraction of a period.
+        scale = abs(wave * rate) + abs(bump / width) + abs(slope)
+        assert found == pytest.approx(exact, abs=2e-8 * scale)
