@@ -13,7 +13,7 @@ from hybrid_model.variables import Value
 class EventTriggeredFeedback(hm.HybridAutomaton):
     """Holds ``u = K xhat`` and takes over a new state xhat when ``|xhat - x| >= sigma |x|``.
 
-    The trigger of Tabuada (2007), section III, for linear plants. The threshold is ``sigma |x|`` or `floor`, whichever
+    The trigger of Tabuada (2007) for linear plants. The threshold is ``sigma |x|`` or `floor`, whichever
     is larger: without a floor the trigger would be ``0 >= 0`` at the origin and fire for ever (semantics: rule 8).
     With it the state ends in a ball whose radius is of the order of ``floor/sigma``. A larger threshold only puts
     events off, so `minimum_inter_event_time` holds with the floor too. The update at the start, ``xhat = x``, is not
@@ -55,8 +55,7 @@ class EventTriggeredLtiLoop(hm.Composition):
     """Event-triggered state feedback of a linear plant, with a guaranteed minimum inter-event time.
 
     P. Tabuada, "Event-triggered real-time scheduling of stabilizing control tasks", IEEE Trans. Automatic Control
-    52(9), 2007: the plant, the gain and sigma of its example, section V, are the values below. Between two events the
-    loop is affine, so the event times are exact by matrix exponentials.
+    52(9), 2007: the plant, the gain and sigma of its example are the values below. Between two events the loop is affine, so the event times are exact by matrix exponentials.
 
     Parameters
     ----------
@@ -95,8 +94,8 @@ def minimum_inter_event_time(A: npt.ArrayLike, B: npt.ArrayLike, K: npt.ArrayLik
 
     With ``e = xhat - x`` the loop is ``x' = (A + B K) x + B K e`` and ``e' = -x'``, so that ``|e|/|x|`` grows no faster
     than the solution of ``phi' = a + (a + b) phi + b phi^2``, ``phi(0) = 0``, with the spectral norms
-    ``a = |A + B K|`` and ``b = |B K|`` (Tabuada 2007, section IV, linear case). The bound is the time at which
-    phi reaches sigma: ``integral of dphi / ((1 + phi)(a + b phi)) over phi from 0 to sigma``.
+    ``a = |A + B K|`` and ``b = |B K|`` (Tabuada 2007, the bound on inter-execution times of linear systems). The bound
+    is the time at which phi reaches sigma: ``integral of dphi / ((1 + phi)(a + b phi)) over phi from 0 to sigma``.
 
     Parameters
     ----------
