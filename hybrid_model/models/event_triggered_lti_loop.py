@@ -13,9 +13,8 @@ from hybrid_model.variables import Value
 class EventTriggeredFeedback(hm.HybridAutomaton):
     """Holds ``u = K xhat`` and takes over a new state xhat when ``|xhat - x| >= sigma |x|``.
 
-    The trigger of Tabuada (2007) for linear plants. The threshold is ``sigma |x|`` or `floor`, whichever
-    is larger: without a floor the trigger would be ``0 >= 0`` at the origin and fire for ever (semantics: rule 8).
-    With it the state ends in a ball whose radius is of the order of ``floor/sigma``. A larger threshold only puts
+    The trigger of Tabuada (2007) for linear plants. The threshold is ``sigma |x|`` or `floor`, whichever is larger:
+    without a floor the trigger would be ``0 >= 0`` at the origin and fire for ever (semantics: rule 8). With it the state ends in a ball whose radius is of the order of ``floor/sigma``. A larger threshold only puts
     events off, so `minimum_inter_event_time` holds with the floor too. The update at the start, ``xhat = x``, is not
     counted as an event.
     """
@@ -55,7 +54,8 @@ class EventTriggeredLtiLoop(hm.Composition):
     """Event-triggered state feedback of a linear plant, with a guaranteed minimum inter-event time.
 
     P. Tabuada, "Event-triggered real-time scheduling of stabilizing control tasks", IEEE Trans. Automatic Control
-    52(9), 2007: the plant, the gain and sigma of its example are the values below. Between two events the loop is affine, so the event times are exact by matrix exponentials.
+    52(9), 2007: the plant, the gain and sigma of its example are the values below. Between two events the
+    loop is affine, so the event times are exact by matrix exponentials.
 
     Parameters
     ----------
