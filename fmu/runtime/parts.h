@@ -7,7 +7,7 @@
 #include "engine.h"
 
 #define N_STAGES 7            /* Dormand-Prince 5(4) */
-#define N_SAMPLES 12          /* where a step is looked at for crossings */
+#define N_SAMPLES 9           /* of each margin, where a step is looked at for crossings */
 #define N_ZENO_TIMES 12       /* remembered times of each jump */
 #define MESSAGE_SIZE 768
 
@@ -148,13 +148,14 @@ bool step_probe(Engine *engine, const Point *point, double t);
 /* The interpolation of the present step: engine->dense_x. */
 void step_dense(Engine *engine, double t);
 
-/* locate.c */
+/* sets.c */
 double event_tolerance(double t);
 /* Margins of the jumps at (t, x); false if one is not a number. */
 bool evaluate_margins(Engine *engine, double t, const double *x, const double *z);
 bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin);
 /* Whether the point may flow as far as the flow set says; *level is the margin to be kept. */
 bool flow_may_begin(Engine *engine, const Point *point, double *level);
+/* locate.c */
 /* Looks for the first event on the present step; FLOW_EVENT moves the point there. */
 FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end);
 /* Enables the guards that would cross within the event tolerance after `t`, a time on or at the end of

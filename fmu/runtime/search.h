@@ -1,0 +1,68 @@
+/* What locating an event on the present step needs to know: shared by
+   sets.c, rises.c, crossings.c and locate.c. */
+#ifndef HYBRID_SEARCH_H
+#define HYBRID_SEARCH_H
+
+#include "parts.h"
+
+#define DEGREE (N_SAMPLES - 1)
+/* How often one row is halved in one step: a simple crossing needs none, a kink some ten. */
+#define HALVINGS 60
+
+/* Rows are the jumps' margins, then the exit from the flow set. */
+typedef struct {
+    Engine *engine;
+    const Point *point;
+    double level;             /* the margin of the flow set that is to be kept */
+    double piece_end;         /* the flow may be probed up to here */
+    size_t n_rows, exit_row;
+    bool failed;
+} Search;
+
+typedef enum { ON_INTERPOLATION, ON_STEP } Path;
+
+typedef struct {
+    double a, value_a;        /* negative */
+    double b, value_b;        /* zero or above */
+} Bracket;
+
+/* The rises of a row through a threshold along the interpolation, in the order of time.  The pieces
+   still to be looked at lie end to end, so their ends are all there is to keep of them. */
+typedef struct {
+    Search *search;
+    size_t row;
+    double threshold;
+    double begin, value;      /* the start of the next piece, and the row there less the threshold */
+    double ends[HALVINGS + 1];
+    size_t n_ends;
+    int halvings;
+} Rises;
+
+/* crossings.c */
+/* Fills `rows` with the margins at a time of the step; a failure is noted in the search and ends every
+   loop on it. */
+bool look(Search *search, Path path, double t, double *rows);
+/* The value of one row. */
+double look_at(Search *search, Path path, double t, size_t row);
+/* The value of one row in a sample of the present step. */
+double sample(const Search *search, size_t i, size_t row);
+/* Shrinks a bracket on the solver's step to the width at which a crossing is located. */
+void polish(Search *search, size_t row, Bracket *bracket);
+/* The first guard crossing on the step; with flow priority guards are not looked at inside the flow set. */
+bool first_guard(Search *search, double *t);
+/* The time at which the flow set is left, if the step leaves it by more than the tolerance. */
+bool first_exit(Search *search, double *t);
+
+/* sets.c */
+/* Notes that the state can neither flow nor jump; always false. */
+bool blocked(Engine *engine, double t, const double *x, const double *z, double margin);
+
+/* rises.c */
+/* The time of a sample of the piece from a to b. */
+double sample_time(double a, double b, size_t i);
+/* Begins at the start of the present step, whose samples must be there. */
+void begin_rises(Rises *rises, Search *search, size_t row, double threshold);
+/* The next bracket among the pieces that begin up to `latest`; false if there is none, or on failure. */
+bool next_rise(Rises *rises, double latest, Bracket *bracket);
+
+#endif
