@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import CosimError
-from cosim.lookahead import Lookahead, take_internal
-from cosim.slave import Port, Slave, Step, Termination, Update
-from hybrid_model import Automaton, Execution, Solver, Stop
+from cosim.slave import Port, Slave, Step, Update
+from hybrid_model import Automaton, Execution, Solver
+from hybrid_model.automaton_block import AutomatonBlock
+from hybrid_model.errors import SchedulingError
 from hybrid_model.layout import Layout
 from hybrid_model.signals import Inputs
 from hybrid_model.variables import Kind, element_names
@@ -46,56 +47,45 @@ class AutomatonSlave(Slave):
         super().__init__(name, ports[Kind.INPUT], outputs, [clock.name for clock in automaton.clocks])
         self.automaton = automaton
         self._solver = solver
-        self._places = {element: (kind, k) for kind in Kind for k, element in enumerate(layout.names(kind))}
+        self._names = [element for kind in Kind for element in layout.names(kind)]
         self._predictable = all(port.discrete for port in ports[Kind.INPUT])
         self._starts: dict[str, float] = {}
-        self._run: Execution | None = None
-        self._ahead: Lookahead | None = None
-        self._ticks: list[str] = []
+        self._block: AutomatonBlock | None = None
 
     @property
     def variable_names(self) -> list[str]:
         """See `Slave.variable_names`."""
-        return list(self._places)
+        return self._names
 
     def set(self, name: str, value: float) -> None:
         """See `Slave.set`."""
-        if name not in self._places:
+        if name not in self._names:
             raise self.unknown(name)
         if not np.isfinite(value):
             raise CosimError(f"{self.name}.{name} is set to {value}: set a finite number.")
-        if self._run is None:
+        if self._block is None:
             self._starts[name] = value
-        elif self._set_in_run(*self._places[name], value):
-            self._ahead = None
+        else:
+            self._block.set(name, value)
 
     def get(self, name: str) -> float:
         """See `Slave.get`."""
-        if name not in self._places:
+        if name not in self._names:
             raise self.unknown(name)
-        kind, index = self._places[name]
-        run = self._running
-        if kind is Kind.OUTPUT:
-            outputs = self.automaton.output_values(run.values())
-            return float(run.layout.pack(Kind.OUTPUT, outputs)[index])
-        vectors = {Kind.STATE: run.x, Kind.DISCRETE: run.z, Kind.PARAMETER: run.p, Kind.INPUT: run.inputs.at(run.t)}
-        return float(vectors[kind][index])
+        return self._running.get(name)
 
     def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
         """See `Slave.start`."""
-        self._events, self._t_stop = events, t_stop
-        layout = Layout(self.automaton)
-        self._run = Execution(self.automaton, t_start=t_start, inputs=Inputs(layout), solver=self._solver)
+        run = Execution(self.automaton, t_start=t_start, inputs=Inputs(Layout(self.automaton)), solver=self._solver)
+        self._block = AutomatonBlock(self.name, run, t_stop, predictable=self._predictable, events=events, keep=False)
         for name, value in self._starts.items():
-            self._set_in_run(*self._places[name], value)
-        self._run.compute_start()
+            self._block.set(name, value)
+        run.compute_start()
 
     def begin(self) -> None:
         """See `Slave.begin`."""
-        self._running.compute_start()
-        take_internal(self._running)
-        if not self._events:
-            self._take_all()
+        self._running.run.compute_start()
+        self._running.begin()
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
@@ -105,95 +95,35 @@ class AutomatonSlave(Slave):
 
     def update(self) -> Update:
         """See `Slave.update`."""
-        run = self._running
-        take_internal(run)
-        ticks: tuple[str, ...] = ()
-        index = run.due()
-        if index is not None:
-            run.jump(index)
-            self._ahead = None
-            ticks = tuple(clock.name for clock in self.automaton.clocks if clock.jump == index)
-            take_internal(run)
-        if run.stopped is not None:
-            return Update(False, ticks, terminated=_termination(run))
-        again = run.due() is not None
-        return Update(again, ticks, None if again else self._predict())
+        return self._running.update()
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Slave.step`."""
-        run, ahead = self._running, self._ahead
-        if abs(run.t - t) > 1e-12 * max(1.0, abs(t)) or not t_next > t:
-            raise CosimError(f"{self.name} is at t = {run.t:.12g} s and cannot step from {t:.12g} to {t_next:.12g} s.")
-        if ahead is None:
-            self._search(run, t_next)
-        elif t_next < ahead.end.t:
-            ahead.move(run, t_next)
-        else:
-            self._run = run = ahead.end
-            self._ahead = None
-            # The master may go slightly beyond the event, to where another block's simultaneous event is.
-            if t_next <= run.t + run.solver.event_tolerance:
-                run.drift(t_next)
-        due = self._events and ((ahead is not None and run is ahead.end) or run.due() is not None)
-        return Step(run.t, due, _termination(run))
-
-    def _search(self, run: Execution, t_next: float) -> None:
-        """Flow to `t_next`, looking for events on the way."""
-        while run.t < t_next and run.stopped is None:
-            run.flow(t_next)
-            take_internal(run)
-            if self._events and run.due() is not None:
-                return
-            if not self._events:
-                self._take_all()
+        try:
+            return self._running.step(t, t_next)
+        except SchedulingError as error:
+            raise CosimError(str(error)) from error
 
     def save(self) -> Any:
         """See `Slave.save`."""
-        return self._running.copy()
+        return self._running.save()
 
     def restore(self, state: Any) -> None:
         """See `Slave.restore`."""
-        self._run, self._ahead = state.copy(), None
+        self._running.restore(state)
 
     def release(self, state: Any) -> None:
         """See `Slave.release`."""
 
     def close(self) -> None:
         """See `Slave.close`."""
-        self._run = self._ahead = None
+        self._block = None
 
     @property
-    def _running(self) -> Execution:
-        if self._run is None:
+    def _running(self) -> AutomatonBlock:
+        if self._block is None:
             raise CosimError(f"{self.name} has not been started: call start first.")
-        return self._run
-
-    def _set_in_run(self, kind: Kind, index: int, value: float) -> bool:
-        run = self._running
-        if kind is Kind.INPUT:
-            return run.inputs.hold_element(index, value)
-        vector = {Kind.STATE: run.x, Kind.DISCRETE: run.z, Kind.PARAMETER: run.p}[kind]
-        changed = bool(vector[index] != value)
-        vector[index] = value
-        return changed
-
-    def _take_all(self) -> None:
-        run = self._running
-        while run.stopped is None and (index := run.due()) is not None:
-            run.jump(index)
-
-    def _predict(self) -> float | None:
-        """Run a copy ahead to its next event, or to the stop time, and keep it: stepping there costs nothing more."""
-        if not self._predictable or self._running.t >= self._t_stop:
-            return None
-        if self._ahead is None:
-            self._ahead = Lookahead.from_run(self._running, self._t_stop)
-        # A run that ends where it is has no time to announce; the next step says why it ends.
-        return self._ahead.end.t if self._ahead.end.t > self._running.t else None
-
-
-def _termination(run: Execution) -> Termination | None:
-    return None if run.stopped is None else Termination(run.message, run.stopped is Stop.ZENO)
+        return self._block
 
 
 def _is_output(automaton: Automaton, element: str) -> bool:

@@ -8,7 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from cosim.slave import Termination
+from hybrid_model.blocks import Termination
+from hybrid_model.scheduler import Tick
+
+__all__ = ["CosimResult", "Ended", "Tick"]
 
 
 class Ended(enum.Enum):
@@ -17,15 +20,6 @@ class Ended(enum.Enum):
     HORIZON = "The stop time was reached."
     ZENO = "The jumps of a slave accumulate: end the run before that time, or change the slave as its message says."
     TERMINATED = "A slave ended the run: its message says why and what to change."
-
-
-@dataclass(frozen=True)
-class Tick:
-    """A tick of an output clock: `slave`'s `clock` at `t` in s."""
-
-    t: float
-    slave: str
-    clock: str
 
 
 @dataclass

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from cosim.errors import MisfitError
+from hybrid_model.blocks import Block, Step, Termination, Update
+
+__all__ = ["Port", "Slave", "Step", "Termination", "Update"]
 
 
 @dataclass(frozen=True)
@@ -27,64 +29,7 @@ class Port:
     discrete: bool = False
 
 
-@dataclass(frozen=True)
-class Termination:
-    """Why a block ended the run.
-
-    Attributes
-    ----------
-    message : str
-        In the block's words.
-    zeno : bool
-        Whether a Zeno guard did, as far as the block says.
-    """
-
-    message: str
-    zeno: bool
-
-
-@dataclass(frozen=True)
-class Update:
-    """What one event iteration of a block gave.
-
-    Attributes
-    ----------
-    again : bool
-        Whether the block needs another iteration at this instant.
-    ticks : tuple of str
-        Output clocks that ticked.
-    next_event : float or None
-        Absolute time in s of the block's next event as long as its inputs stay; None if it does not know.
-    terminated : Termination or None
-        Why the block ended the run, if it did.
-    """
-
-    again: bool
-    ticks: tuple[str, ...] = ()
-    next_event: float | None = None
-    terminated: Termination | None = None
-
-
-@dataclass(frozen=True)
-class Step:
-    """What one step of a block gave.
-
-    Attributes
-    ----------
-    reached : float
-        Time in s that the block is at now.
-    event : bool
-        Whether it has an event to be handled there.
-    terminated : Termination or None
-        Why the block ended the run, if it did.
-    """
-
-    reached: float
-    event: bool
-    terminated: Termination | None = None
-
-
-class Slave(ABC):
+class Slave(Block):
     """A block in a co-simulation.
 
     The order of calls is FMI's: `set` start values, `start` (initialization mode), `set` inputs, `begin` (event mode,
@@ -130,38 +75,6 @@ class Slave(ABC):
     @abstractmethod
     def set(self, name: str, value: float) -> None:
         """Set an input, or before `start` a start value or parameter."""
-
-    @abstractmethod
-    def get(self, name: str) -> float:
-        """Return the present value of a variable."""
-
-    @abstractmethod
-    def enter_event_mode(self) -> None:
-        """Go from step mode to event mode."""
-
-    @abstractmethod
-    def enter_step_mode(self) -> None:
-        """Go from event mode to step mode."""
-
-    @abstractmethod
-    def update(self) -> Update:
-        """Do one event iteration: at most one jump."""
-
-    @abstractmethod
-    def step(self, t: float, t_next: float) -> Step:
-        """Go from `t` to `t_next`, or to the first event before it."""
-
-    @abstractmethod
-    def save(self) -> Any:
-        """Return the block's whole state."""
-
-    @abstractmethod
-    def restore(self, state: Any) -> None:
-        """Return to a saved state, which may be restored again."""
-
-    @abstractmethod
-    def release(self, state: Any) -> None:
-        """Free a saved state."""
 
     @abstractmethod
     def close(self) -> None:

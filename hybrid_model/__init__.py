@@ -13,6 +13,7 @@ from hybrid_model.errors import (
     SimulationError,
     WiringError,
 )
+from hybrid_model.event_network import NetworkRun, simulate_network
 from hybrid_model.execution import Execution, JumpRecord
 from hybrid_model.margins import greatest, least
 from hybrid_model.modes import ModalAutomaton, Mode, Switch, TimedSwitch
@@ -49,6 +50,7 @@ __all__ = [
     "MinimumDwell",
     "ModalAutomaton",
     "Mode",
+    "NetworkRun",
     "Output",
     "Parameter",
     "Priority",
@@ -74,5 +76,6 @@ __all__ = [
     "product",
     "series",
     "simulate",
+    "simulate_network",
     "verify",
 ]

@@ -12,7 +12,7 @@ from hybrid_model.automaton import Automaton
 from hybrid_model.errors import AlgebraicLoopError, DeclarationError, WiringError
 from hybrid_model.layout import Layout
 from hybrid_model.transitions import Assignments, ClockInfo, JumpInfo, Priority, Trigger
-from hybrid_model.variables import Kind, Value, Values, Variable, unknown_name
+from hybrid_model.variables import Kind, Value, Values, Variable, element_names, unknown_name
 
 Source = str | Sequence[str]
 """``"part.output"``, or one such name per element of a vector input."""
@@ -24,6 +24,19 @@ class _Wire:
 
     sources: tuple[tuple[str, str], ...]
     stacked: bool
+
+
+@dataclass(frozen=True)
+class ElementWire:
+    """A scalar signal from a part's output to a part's input; elements of vectors are named as in ``w[1]``."""
+
+    source: str
+    output: str
+    target: str
+    input: str
+
+    def __str__(self) -> str:
+        return f"{self.source}.{self.output} -> {self.target}.{self.input}"
 
 
 class Composition(Automaton):
@@ -62,12 +75,9 @@ class Composition(Automaton):
     ) -> None:
         self.name = name
         self.parts = dict(parts)
-        self._wires = {
-            part: {
-                variable: wire for (owner, variable), wire in _wires(self, connections or {}).items() if owner == part
-            }
-            for part in self.parts
-        }
+        self._wires: dict[str, dict[str, _Wire]] = {part: {} for part in self.parts}
+        for (part, variable), wire in _wires(self, connections or {}).items():
+            self._wires[part][variable] = wire
         self._names = _scoped_names(self, names or {})
         self.variables = tuple(
             variable.renamed(self._names[part, variable.name])
@@ -95,8 +105,9 @@ class Composition(Automaton):
             for part, automaton in self.parts.items()
             for info in automaton.jumps
         )
+        numbers = {owner: number for number, owner in enumerate(self._owner)}
         self.clocks = tuple(
-            ClockInfo(self._names[part, clock.name], self._owner.index((part, clock.jump)), clock.description)
+            ClockInfo(self._names[part, clock.name], numbers[part, clock.jump], clock.description)
             for part, automaton in self.parts.items()
             for clock in automaton.clocks
         )
@@ -158,6 +169,27 @@ class Composition(Automaton):
             if automaton.of_kind(Kind.OUTPUT):
                 values.update(self._scoped(part, scopes.outputs(part)))
         return values
+
+    def part_values(self, part: str, s: Values) -> Values:
+        """Return the values of one part, inputs over wires included, out of those of the composition."""
+        return _Scopes(self, s).of(part)
+
+    def scoped_name(self, part: str, variable: str) -> str:
+        """Return the name in the composition of a part's variable."""
+        return self._names[part, variable]
+
+    @property
+    def wires(self) -> tuple[ElementWire, ...]:
+        """The connections, scalar by scalar, in the order of parts and inputs."""
+        return tuple(
+            ElementWire(owner, output, part, element)
+            for part, automaton in self.parts.items()
+            for variable in automaton.of_kind(Kind.INPUT)
+            if variable.name in self._wires[part]
+            for (owner, output), element in zip(
+                _source_elements(self, self._wires[part][variable.name]), element_names(variable), strict=True
+            )
+        )
 
     def _scoped(self, part: str, assignments: Assignments) -> dict[str, Value]:
         return {self._names[part, key]: value for key, value in assignments.items()}
@@ -257,8 +289,15 @@ def _wires(composition: Composition, connections: Mapping[str, Source]) -> dict[
     return wires
 
 
+def _source_elements(composition: Composition, wire: _Wire) -> list[tuple[str, str]]:
+    outputs = {(part, v.name): v for part, _ in wire.sources for v in composition.parts[part].variables}
+    return [(source[0], name) for source in wire.sources for name in element_names(outputs[source])]
+
+
 def _find(composition: Composition, scoped: str, kinds: tuple[Kind, ...], what: str) -> tuple[str, Variable]:
-    part = next((p for p in sorted(composition.parts, key=len, reverse=True) if scoped.startswith(p + ".")), None)
+    # The longest part that fits: names of parts may contain dots.
+    ends = [at for at, letter in enumerate(scoped) if letter == "."]
+    part = next((scoped[:at] for at in reversed(ends) if scoped[:at] in composition.parts), None)
     if part is None:
         raise WiringError(unknown_name(f"{composition.name} (parts)", scoped, composition.parts))
     known = {v.name: v for v in composition.parts[part].variables if v.kind in kinds}

@@ -23,3 +23,7 @@ class SimulationError(HybridModelError, RuntimeError):
 
 class DataError(HybridModelError, ValueError):
     """Data from outside, in a table or a file, are not what they must be."""
+
+
+class SchedulingError(HybridModelError, RuntimeError):
+    """Blocks that meet at events contradict what they announced, or iterate without end."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import SimulationError
-from hybrid_model.flow import FlowPiece, integrate
+from hybrid_model.flow import FlowPiece, integrate, straight_piece
 from hybrid_model.layout import not_finite
 from hybrid_model.locate import ulp
 from hybrid_model.signals import Inputs
@@ -311,14 +311,16 @@ class Execution:
         return int(np.count_nonzero(self._on_state[:index] == self._on_state[index]))
 
     @_QUIET
-    def drift(self, t: float) -> None:
+    def drift(self, t: float) -> list[FlowPiece]:
         """Move on by no more than the event tolerance with the present derivative, although a jump is due.
 
         Simultaneous events of other parts are handled at the latest of their times (rule 6).
         """
-        if t > self.t:
-            self.x = self.x + (t - self.t) * self.rates_at(self.t, self.x)
-            self.t = t
+        if t <= self.t:
+            return []
+        piece = straight_piece(self.t, t, self.x, self.x + (t - self.t) * self.rates_at(self.t, self.x))
+        self.t, self.x = piece.t1, piece.x1
+        return [piece]
 
     def _block(self, what: str) -> None:
         self.stopped = Stop.BLOCKED

@@ -26,7 +26,7 @@ FLOW_FIRST_SLACK = 1e-15
 ATTEMPTS = 1000
 """Evaluations, a state, after which a step that has met a derivative that is not finite is given up: a stepper that
 halves its step to nothing needs hundreds, and LSODA would try the same step for ever."""
-STATELESS_STEPS = 200
+STATELESS_STEPS = 25
 """Steps over a flow without continuous states, where no error estimate limits them."""
 
 
@@ -79,7 +79,7 @@ def integrate(execution: Execution, limit: float, time_event: float) -> tuple[li
     watch = _Watch(execution)
     if end - execution.t <= SHORTEST * ulp(end):
         x1 = execution.x + (end - execution.t) * _FlowMap(execution, end)(execution.t, execution.x)
-        pieces.append(_move(execution, _straight(execution.t, end, execution.x, x1)))
+        pieces.append(_move(execution, straight_piece(execution.t, end, execution.x, x1)))
         watch.raise_levels(pieces[-1])
         return pieces, False
     for piece in _steps(execution, end):
@@ -108,7 +108,8 @@ def _move(execution: Execution, piece: FlowPiece) -> FlowPiece:
     return piece
 
 
-def _straight(t0: float, t1: float, x0: FloatArray, x1: FloatArray) -> FlowPiece:
+def straight_piece(t0: float, t1: float, x0: FloatArray, x1: FloatArray) -> FlowPiece:
+    """Return the piece of a flow that is a straight line from x0 at t0 to x1 at t1."""
     span = t1 - t0 or 1.0
 
     def interpolate(t: float | FloatArray) -> FloatArray:
@@ -188,7 +189,7 @@ def _stateless_steps(execution: Execution, end: float) -> Any:
     step = min(execution.solver.max_step, (end - execution.t) / STATELESS_STEPS)
     times = np.linspace(execution.t, end, int(np.ceil((end - execution.t) / step)) + 1)
     for t0, t1 in itertools.pairwise(times):
-        yield _straight(float(t0), float(t1), execution.x, execution.x)
+        yield straight_piece(float(t0), float(t1), execution.x, execution.x)
 
 
 def _failure(execution: Execution, flow_map: _FlowMap, t: float, x: FloatArray, problem: str | None) -> str:
@@ -268,7 +269,7 @@ class _Watch:
         execution = self._execution
         t, x = execution.t, execution.x
         enabled = self._margins(t, x)[: self._guards] >= execution.levels
-        piece = _move(execution, _straight(t, end, x, x + (end - t) * _FlowMap(execution, end)(t, x)))
+        piece = _move(execution, straight_piece(t, end, x, x + (end - t) * _FlowMap(execution, end)(t, x)))
         now = self._margins(end, piece.x1)[: self._guards]
         execution.levels = np.where(enabled & (now < 0.0), now, 0.0)
         return piece

@@ -30,6 +30,8 @@ Margin = Callable[[float], float]
 SMALLEST = float(np.finfo(np.float64).tiny)
 DEGREE = 8
 """Degree of the polynomials; the dense output of DOP853 has degree 7."""
+CAUTION = 4.0
+"""The error of the polynomial is taken as this many times the tail: beside a kink it is twice that large."""
 HALVINGS = 60
 """How often one margin is halved in one step: a simple crossing needs none, a kink some ten."""
 
@@ -41,7 +43,7 @@ def _matrices(degree: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     bernstein = comb(degree, k) * points[:, None] ** k * (1.0 - points[:, None]) ** (degree - k)
     chebyshev = np.polynomial.chebyshev.chebvander(2.0 * points - 1.0, degree)
     to_bernstein, to_chebyshev = (np.linalg.inv(np.asarray(m, dtype=np.float64)) for m in (bernstein, chebyshev))
-    return points, to_bernstein, to_chebyshev[-2:]
+    return points, to_bernstein, CAUTION * to_chebyshev[-2:]
 
 
 POINTS, TO_BERNSTEIN, TO_TAIL = _matrices(DEGREE)

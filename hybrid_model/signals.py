@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bisect
+import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -97,6 +99,11 @@ class Inputs:
         return changed
 
     @property
+    def held(self) -> FloatArray:
+        """The constants in u; the array must not be written to."""
+        return self._held
+
+    @property
     def names(self) -> list[str]:
         """Names of the inputs."""
         return [place.variable.name for place in self._layout.places[Kind.INPUT]]
@@ -121,12 +128,32 @@ class Inputs:
 
     def copy(self) -> Inputs:
         """Return an independent copy."""
-        other = object.__new__(Inputs)
-        other._layout = self._layout
+        other = copy.copy(self)
         other._held = self._held.copy()
-        other._signals = self._signals
-        other._breakpoints = self._breakpoints
         return other
+
+
+class RecordedInputs(Inputs):
+    """The input vector of a run that is over: what was held in it from when on.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        At the end of the run.
+    times : sequence of float
+        In s, in order: when the constants changed.
+    held : sequence of ndarray
+        The constants from each of these times on; of several at one time the last counts.
+    """
+
+    def __init__(self, inputs: Inputs, times: Sequence[float], held: Sequence[FloatArray]) -> None:
+        self.__dict__.update(inputs.copy().__dict__)
+        self._times, self._history = list(times), list(held)
+
+    def at(self, t: float) -> FloatArray:
+        """Return u at time `t`."""
+        self._held = self._history[max(bisect.bisect_right(self._times, t) - 1, 0)]
+        return super().at(t)
 
 
 def _finite_breakpoints(name: str, signal: Signal) -> list[float]:

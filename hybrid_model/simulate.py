@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from hybrid_model.arc import FlowRecord, HybridArc
+from hybrid_model.arc import HybridArc
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import SimulationError
-from hybrid_model.execution import Execution, JumpRecord
+from hybrid_model.execution import Execution
 from hybrid_model.layout import Layout
+from hybrid_model.recording import Recording
 from hybrid_model.signals import Inputs, InputValue
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
@@ -59,16 +60,13 @@ def simulate(
     execution = Execution(
         automaton, t_start=t_start, inputs=Inputs(Layout(automaton), inputs), solver=solver, zeno=zeno
     )
-    flows = [FlowRecord(execution.t, execution.x, execution.z, ())]
-    jumps: list[JumpRecord] = []
+    recording = Recording(execution)
     while execution.stopped is None:
         index = execution.due()
         if index is not None:
-            jumps.append(execution.jump(index))
-            flows.append(FlowRecord(execution.t, execution.x, execution.z, ()))
+            recording.jumped(execution.jump(index))
         elif execution.t >= t_end and execution.in_flow_set(execution.solver.event_tolerance):
             execution.stopped, execution.message = Stop.HORIZON, f"{automaton.name}: reached t = {t_end:.9g} s."
         else:
-            pieces = execution.flow(t_end)
-            flows[-1] = flows[-1].extended(pieces)
-    return HybridArc(execution, flows, jumps)
+            recording.flowed(execution.flow(t_end))
+    return HybridArc(execution, recording.flows, recording.jumps)

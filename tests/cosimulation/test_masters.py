@@ -246,3 +246,13 @@ def test_a_block_that_cannot_begin_ends_the_run_with_its_own_words(kind, exporte
     assert result.ended is Ended.TERMINATED
     assert "x = -1" in result.message
     assert result.t == 0.0
+
+
+@pytest.mark.parametrize(("t_stop", "points"), [(11.9, 41), (12.0, 41), (0.7, 8)])
+def test_output_points_end_at_the_stop_time_whatever_rounding_says(t_stop, points):
+    # 40 * (11.9/40) is an ulp below 11.9.
+    interval = t_stop / (points - 1)
+    system = System([AutomatonSlave("ball", BouncingBall(h=100.0, e=1.0))], {})
+    result = run_event_exact(system, t_stop, output_interval=interval)
+    assert len(result.times) == points
+    assert result.times[-1] == t_stop

@@ -1,0 +1,112 @@
+"""What a scheduler of events sees of a block: an automaton in this process, an FMU, or anything that predicts."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Termination:
+    """Why a block ended the run.
+
+    Attributes
+    ----------
+    message : str
+        In the block's words.
+    zeno : bool
+        Whether a Zeno guard did, as far as the block says.
+    """
+
+    message: str
+    zeno: bool
+
+
+@dataclass(frozen=True)
+class Update:
+    """What one event iteration of a block gave.
+
+    Attributes
+    ----------
+    again : bool
+        Whether the block needs another iteration at this instant.
+    ticks : tuple of str
+        Output clocks that ticked.
+    next_event : float or None
+        Absolute time in s of the block's next event as long as its inputs stay; None if it does not know.
+    terminated : Termination or None
+        Why the block ended the run, if it did.
+    """
+
+    again: bool
+    ticks: tuple[str, ...] = ()
+    next_event: float | None = None
+    terminated: Termination | None = None
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one step of a block gave.
+
+    Attributes
+    ----------
+    reached : float
+        Time in s that the block is at now.
+    event : bool
+        Whether it has an event to be handled there.
+    terminated : Termination or None
+        Why the block ended the run, if it did.
+    """
+
+    reached: float
+    event: bool
+    terminated: Termination | None = None
+
+
+class Block(ABC):
+    """A block that is stepped from event to event; the calls and their order are those of FMI.
+
+    Attributes
+    ----------
+    name : str
+        Unique among the blocks of a run.
+    """
+
+    name: str
+
+    @abstractmethod
+    def set(self, name: str, value: float) -> None:
+        """Set a scalar input."""
+
+    @abstractmethod
+    def get(self, name: str) -> float:
+        """Return the present value of a scalar variable."""
+
+    @abstractmethod
+    def enter_event_mode(self) -> None:
+        """Go from step mode to event mode."""
+
+    @abstractmethod
+    def enter_step_mode(self) -> None:
+        """Go from event mode to step mode."""
+
+    @abstractmethod
+    def update(self) -> Update:
+        """Do one event iteration: at most one jump."""
+
+    @abstractmethod
+    def step(self, t: float, t_next: float) -> Step:
+        """Go from `t` to `t_next`, or to the first event before it."""
+
+    @abstractmethod
+    def save(self) -> Any:
+        """Return the block's whole state."""
+
+    @abstractmethod
+    def restore(self, state: Any) -> None:
+        """Return to a saved state, which may be restored again."""
+
+    @abstractmethod
+    def release(self, state: Any) -> None:
+        """Free a saved state."""

@@ -1,0 +1,62 @@
+"""What a run leaves behind, collected while it goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hybrid_model.flow import FlowPiece
+from hybrid_model.flow_record import FlowRecord
+from hybrid_model.signals import Inputs, RecordedInputs
+from hybrid_model.variables import FloatArray
+
+if TYPE_CHECKING:
+    from hybrid_model.execution import Execution, JumpRecord
+
+
+class Recording:
+    """The flows and jumps of a run, in order; one flow more than jumps.
+
+    Parameters
+    ----------
+    execution : Execution
+        At its start.
+    keep : bool
+        Whether to keep anything at all.
+    """
+
+    def __init__(self, execution: Execution, *, keep: bool = True) -> None:
+        self._keep = keep
+        self.jumps: list[JumpRecord] = []
+        self._closed: list[FlowRecord] = []
+        self._open = FlowRecord(execution.t, execution.x, execution.z, ())
+        self._pieces: list[FlowPiece] = []
+        self._received = [(execution.t, execution.inputs.held)]
+
+    def flowed(self, pieces: Sequence[FlowPiece]) -> None:
+        """Note steps of the present flow."""
+        if self._keep:
+            self._pieces += pieces
+
+    def jumped(self, jump: JumpRecord) -> None:
+        """Note a jump: another flow begins."""
+        if not self._keep:
+            return
+        self.jumps.append(jump)
+        self._closed.append(self._open.extended(self._pieces))
+        self._open, self._pieces = FlowRecord(jump.t, jump.x_after, jump.z_after, ()), []
+
+    def received(self, t: float, held: FloatArray) -> None:
+        """Note that inputs changed at `t` in s: the constants in them from now on."""
+        if self._keep:
+            self._received.append((t, held))
+
+    def inputs(self, inputs: Inputs) -> RecordedInputs:
+        """Return the inputs of the run, whose present state is `inputs`, as a function of time."""
+        times, held = zip(*self._received, strict=True)
+        return RecordedInputs(inputs, times, held)
+
+    @property
+    def flows(self) -> list[FlowRecord]:
+        """All flows, the present one last."""
+        return [*self._closed, self._open.extended(self._pieces)]

@@ -1,0 +1,265 @@
+"""The scheduler of blocks that meet only at events: each is advanced only when something happens to it.
+
+Between two events a block's flow is its own, so the block itself predicts its next event (`nextEventTime` in FMI 3.0).
+The scheduler keeps those predictions in a queue, takes the earliest, lets that block jump, and brings only the
+receivers of what it sent to that instant. Nothing is rolled back, and an event costs as much as it has receivers,
+however many blocks there are. Blocks that cannot predict (they name no next event) are stepped to the earliest
+prediction of the others and may stop before it; only they are saved and restored.
+
+`hybrid_model.event_network` runs automata with it, `cosim.masters` FMUs and automata alike.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from hybrid_model.blocks import Block, Step, Termination
+from hybrid_model.errors import SchedulingError
+
+SIMULTANEOUS = 1e-9
+"""In s: events of different blocks closer than this are handled at one instant, in the order of the blocks."""
+ITERATIONS = 10_000
+"""Event iterations of one block at one instant, at most."""
+
+
+class Wire(Protocol):
+    """A scalar signal that leaves a block: its output, and the block and input that it goes to."""
+
+    @property
+    def output(self) -> str:
+        """Output of the block that it leaves."""
+
+    @property
+    def target(self) -> str:
+        """Name of the block that it goes to."""
+
+    @property
+    def input(self) -> str:
+        """Input of that block."""
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A tick of an output clock: `slave`'s `clock` at `t` in s."""
+
+    t: float
+    slave: str
+    clock: str
+
+
+@dataclass
+class _Place:
+    """A block and where it is."""
+
+    block: Block
+    order: int
+    t: float
+    next_event: float | None = None
+    version: int = 0
+
+
+class Scheduler:
+    """The queue of predicted events, and the event iteration at one instant.
+
+    Parameters
+    ----------
+    blocks : mapping
+        Name -> block, in the order in which simultaneous events are handled; all of them in event mode.
+    wires_from : callable
+        Name of a block -> the wires that leave it. All carry signals that change only at events.
+    t_start : float
+        Time in s.
+
+    Attributes
+    ----------
+    t : float
+        Time in s up to which all events are handled.
+    ticks : list of Tick
+        Ticks of output clocks, in order.
+    steps : int
+        Steps made by all blocks together.
+    ended : (str, float, Termination) or None
+        The block that ended the run, when, and why.
+    """
+
+    def __init__(
+        self, blocks: Mapping[str, Block], wires_from: Callable[[str], Iterable[Wire]], t_start: float
+    ) -> None:
+        self.t = t_start
+        self.ticks: list[Tick] = []
+        self.steps = 0
+        self.ended: tuple[str, float, Termination] | None = None
+        self._wires_from = wires_from
+        self._places = {name: _Place(block, k, t_start) for k, (name, block) in enumerate(blocks.items())}
+        self._unpredictable: set[str] = set()
+        self._queue: list[tuple[float, int, int, str]] = []
+
+    def advance_to(self, limit: float) -> None:
+        """Handle all events up to and including `limit` in s, then bring every block there.
+
+        Raises
+        ------
+        SchedulingError
+            If a block asks for event iterations without end, or its predictions contradict its steps.
+        """
+        while not self.ended:
+            t, due = self._next_instant(limit)
+            if not due:
+                break
+            self.handle_events(t, due)
+        for name, place in self._places.items():
+            while not self.ended and place.t < limit:
+                if self._step(place, limit).event and not self.ended:
+                    self._require_announced(place, limit)
+                    place.block.enter_event_mode()
+                    self.handle_events(limit, {name})
+        if not self.ended:
+            self.t = limit
+
+    def handle_events(self, t: float, due: Collection[str]) -> None:
+        """Iterate the events of one instant: jumps in the order of the blocks, signals travelling at once (rule 6).
+
+        Parameters
+        ----------
+        t : float
+            The instant, in s.
+        due : collection of str
+            Blocks that are there, in event mode.
+        """
+        pending, touched = set(due), set(due)
+        iterations: dict[str, int] = {}
+        self.t = t
+        while pending and not self.ended:
+            name = min(pending, key=lambda n: self._places[n].order)
+            iterations[name] = iterations.get(name, 0) + 1
+            if iterations[name] > ITERATIONS:
+                raise SchedulingError(f"{name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s.")
+            update = self._places[name].block.update()
+            self.ticks += [Tick(t, name, clock) for clock in update.ticks]
+            if update.terminated:
+                self.ended = name, t, update.terminated
+                return
+            self._places[name].next_event = update.next_event
+            if not update.again:
+                pending.discard(name)
+            receivers = self._send(name, t, touched)
+            pending |= receivers
+            touched |= receivers
+        for name in touched:
+            self._leave_event_mode(name)
+
+    def _send(self, name: str, t: float, touched: set[str]) -> set[str]:
+        """Carry the outputs of a block to their receivers; return those for whom something changed."""
+        receivers: set[str] = set()
+        sender = self._places[name].block
+        for wire in self._wires_from(name):
+            value = sender.get(wire.output)
+            place = self._places[wire.target]
+            if place.block.get(wire.input) == value:
+                continue
+            if wire.target not in touched and wire.target not in receivers:
+                self._bring(place, t)
+            place.block.set(wire.input, value)
+            receivers.add(wire.target)
+        return receivers
+
+    def _bring(self, place: _Place, t: float) -> None:
+        """Bring a block that receives something to this instant, into event mode."""
+        if place.t < t:
+            self._step(place, t)
+            self._require_announced(place, t)
+        place.block.enter_event_mode()
+
+    def _require_announced(self, place: _Place, t: float) -> None:
+        """Refuse a stop before `t`; within the tolerance before it, it is rounding."""
+        if place.t < t - SIMULTANEOUS and not self.ended:
+            raise SchedulingError(
+                f"{place.block.name} stopped at t = {place.t:.12g} s for an event that it had not announced, on the "
+                f"way to {t:.12g} s: its nextEventTime is wrong."
+            )
+
+    def _step(self, place: _Place, t: float) -> Step:
+        made = place.block.step(place.t, t)
+        self.steps += 1
+        if made.reached < place.t or made.reached > t + SIMULTANEOUS:
+            raise SchedulingError(
+                f"{place.block.name} stepped from {place.t:.12g} towards {t:.12g} s and says that it is at "
+                f"{made.reached:.12g} s: that is outside the step."
+            )
+        place.t = made.reached
+        if made.terminated:
+            self.ended = place.block.name, made.reached, made.terminated
+        return made
+
+    def _leave_event_mode(self, name: str) -> None:
+        place = self._places[name]
+        place.block.enter_step_mode()
+        place.version += 1
+        if place.next_event is None:
+            self._unpredictable.add(name)
+            return
+        self._unpredictable.discard(name)
+        if place.next_event <= place.t:
+            raise SchedulingError(
+                f"{name} is at t = {place.t:.12g} s and says that its next event is at {place.next_event:.12g} s: that "
+                "is not ahead."
+            )
+        heapq.heappush(self._queue, (place.next_event, place.order, place.version, name))
+
+    def _next_instant(self, limit: float) -> tuple[float, set[str]]:
+        """Find the next instant with events up to `limit`, and bring the blocks concerned there."""
+        self._drop_obsolete()
+        first = min(self._queue[0][0] if self._queue else math.inf, limit)
+        stopped = self._watch_unpredictable(first)
+        if stopped:
+            first = min(place.t for place in stopped)
+        due = {place.block.name for place in stopped if place.t <= first + SIMULTANEOUS}
+        instant = first
+        while self._queue and self._queue[0][0] <= min(first + SIMULTANEOUS, limit):
+            time, _, _, name = heapq.heappop(self._queue)
+            instant = max(instant, time)
+            due.add(name)
+            self._drop_obsolete()
+        for name in sorted(due, key=lambda n: self._places[n].order):
+            place = self._places[name]
+            if place.t < instant and not self.ended:
+                self._step(place, instant)
+            if not self.ended:
+                place.block.enter_event_mode()
+        return instant, set() if self.ended else due
+
+    def _drop_obsolete(self) -> None:
+        while self._queue and self._places[self._queue[0][3]].version != self._queue[0][2]:
+            heapq.heappop(self._queue)
+
+    def _watch_unpredictable(self, horizon: float) -> list[_Place]:
+        """Step the blocks that cannot predict to the horizon; return those that stopped at an event.
+
+        Those that went beyond the first stop are restored and stepped again, to it.
+        """
+        watched = [self._places[name] for name in self._unpredictable if self._places[name].t < horizon]
+        if not watched:
+            return []
+        watched.sort(key=lambda place: place.order)
+        saved = [(place, place.t, place.block.save()) for place in watched]
+        stopped: list[_Place] = []
+        try:
+            for place in watched:
+                if self._step(place, horizon).event:
+                    stopped.append(place)
+                if self.ended:
+                    return []
+            first = min((place.t for place in stopped), default=horizon)
+            for place, t, state in saved:
+                if place.t > first + SIMULTANEOUS:
+                    place.block.restore(state)
+                    place.t = t
+                    self._step(place, first)
+        finally:
+            for place, _, state in saved:
+                place.block.release(state)
+        return [place for place in stopped if place.t <= first + SIMULTANEOUS]
