@@ -7,7 +7,7 @@ import zipfile
 import numpy as np
 import pytest
 from catalogue import cases
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_agreement import python_run
 from test_arc_parts import Switched
@@ -268,6 +268,7 @@ def test_truncated_files_are_refused_with_a_sentence(saved):
             hm.load_arc(saved)
 
 
+@settings(deadline=None)
 @given(where=st.floats(0.0, 1.0, exclude_max=True), flip=st.integers(1, 255))
 def test_a_damaged_byte_is_told_or_harmless(tmp_path_factory, where, flip):
     path = tmp_path_factory.getbasetemp() / "damaged.npz"
@@ -299,6 +300,7 @@ def test_a_damaged_array_is_found_by_its_checksum(saved):
 # Interpolation.
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=9), st.floats(-10.0, 10.0), st.floats(0.01, 10.0))
 def test_polynomials_up_to_the_degree_of_the_points_are_reproduced(coefficients, a, length):
     b = a + length

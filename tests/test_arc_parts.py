@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybrid_model as hm
@@ -122,6 +122,7 @@ def test_both_intervals_together_and_a_restriction_of_a_restriction(ball):
     assert (whole.stop, whole.message, whole.event_tolerance) == (ball.stop, ball.message, ball.event_tolerance)
 
 
+@settings(deadline=None)
 @given(ends=st.tuples(st.floats(0.0, 2.0), st.floats(0.0, 2.0)).map(sorted), now=st.floats(0.0, 1.0))
 def test_any_part_agrees_with_the_whole(ball, ends, now):
     part = ball.restrict(t=tuple(ends))

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
@@ -94,6 +94,7 @@ def test_a_csv_file_gives_the_samples_back_bit_by_bit(arc, tmp_path):
         np.testing.assert_array_equal(back[name], value)
 
 
+@settings(deadline=None)
 @given(hnp.arrays(np.float64, (4, 2, 3), elements=st.floats(allow_nan=False)))
 def test_columns_and_arrays_are_inverse(values):
     samples = hm.Samples(np.arange(4.0), np.zeros(4), {"a.m": values, "x": values[:, 0, 0]})
