@@ -30,6 +30,8 @@ def cases():
         "resting_ball": Case(hm.models.RestingBall(slowest=0.3), 3.0),
         "bouncing_ball_with_dwell": Case(hm.MinimumDwell(hm.models.BouncingBall(), 0.05), 3.0),
         "thermostat": Case(hm.models.Thermostat(), 150.0),
+        # Not stiff: the FMU integrates with an explicit method.
+        "stiff_thermostat": Case(hm.models.StiffThermostat(sensor_lag=0.5), 40.0),
         "integrator": Case(
             agents.Integrator(degree=2, x=1.0, weights=[1.0, 0.5]),
             4.0,

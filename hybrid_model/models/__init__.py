@@ -27,6 +27,7 @@ from hybrid_model.models.relay_hysteresis import RelayHysteresis
 from hybrid_model.models.resting_ball import RestingBall
 from hybrid_model.models.sampled_lti_loop import LtiPlant, SampledFeedback, SampledLtiLoop
 from hybrid_model.models.sawtooth_timer import SawtoothTimer, ScheduledSawtoothTimer
+from hybrid_model.models.stiff_thermostat import StiffThermostat
 from hybrid_model.models.switched_feedback import NormSwitch, StaticFeedback, SwitchedFeedback
 from hybrid_model.models.thermostat import Thermostat
 from hybrid_model.models.two_gene_network import TwoGeneNetwork
@@ -70,6 +71,7 @@ __all__ = [
     "SporadicNetwork",
     "SpringPlatform",
     "StaticFeedback",
+    "StiffThermostat",
     "SwitchedFeedback",
     "Thermostat",
     "TwoGeneNetwork",
