@@ -14,9 +14,10 @@ class EventTriggeredFeedback(hm.HybridAutomaton):
     """Holds ``u = K xhat`` and takes over a new state xhat when ``|xhat - x| >= sigma |x|``.
 
     The trigger of Tabuada (2007) for linear plants. The threshold is ``sigma |x|`` or `floor`, whichever is larger:
-    without a floor the trigger would be ``0 >= 0`` at the origin and fire for ever (semantics: rule 8). With it the state ends in a ball whose radius is of the order of ``floor/sigma``. A larger threshold only puts
-    events off, so `minimum_inter_event_time` holds with the floor too. The update at the start, ``xhat = x``, is not
-    counted as an event.
+    without a floor the trigger would be ``0 >= 0`` at the origin and fire for ever (semantics: rule 8). With it the
+    state ends in a ball whose radius is of the order of ``floor/sigma``. A larger threshold only puts events off, so
+    `minimum_inter_event_time` holds with the floor too. The update at the start, ``xhat = x``, is not counted as an
+    event.
     """
 
     order = hm.Dimension("order of the plant")
