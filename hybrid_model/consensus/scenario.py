@@ -8,7 +8,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from hybrid_model.consensus.channel_data import IDEAL
 from hybrid_model.consensus.scenario_data import (
+    Channel,
     Network,
     Scenario,
     Trigger,
@@ -20,9 +22,11 @@ from hybrid_model.consensus.scenario_data import (
 )
 from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching, Switching
 from hybrid_model.consensus.tables import ScenarioError, Table, suggestion
+from hybrid_model.consensus.trigger_data import trigger_keys
 from hybrid_model.consensus.weights import ConstantWeight, GatedSine, Waveform, WeightMap
 
 __all__ = [
+    "Channel",
     "Network",
     "NoSwitching",
     "PeriodicSwitching",
@@ -87,7 +91,7 @@ def read_scenario(entries: Mapping[str, Any]) -> Scenario:
     ScenarioError
         If a key is unknown or missing, or a value has the wrong type or is out of range; the message names the entry.
     """
-    top = Table("the scenario", entries, ("name", "stop_time", "network", "weights", "switching", "trigger"))
+    top = Table("the scenario", entries, ("name", "stop_time", "network", "weights", "switching", "trigger", "channel"))
     network = _read_network(_subtable(top, "network", ("agents", "edges", "initial", "gain", "underlying")))
     edge_count = len(network.edges)
     return Scenario(
@@ -96,7 +100,8 @@ def read_scenario(entries: Mapping[str, Any]) -> Scenario:
         network=network,
         weights=_read_weights(top, edge_count),
         switching=_read_switching(top, edge_count),
-        trigger=_read_trigger(_subtable(top, "trigger", ("kind", "threshold", "decay"))),
+        trigger=_read_trigger(top),
+        channel=_read_channel(top),
     )
 
 
@@ -180,7 +185,21 @@ def _read_switching(top: Table, edge_count: int) -> Switching:
         raise ScenarioError(f"[switching] {error}") from error
 
 
-def _read_trigger(table: Table) -> Trigger:
-    kind = table.choice("kind", TriggerKind)
-    decay = table.number("decay", default=0.0 if kind is TriggerKind.STATIC else None)
-    return Trigger(kind, table.number("threshold"), decay)
+def _read_trigger(top: Table) -> Trigger:
+    keys = {kind: ("kind", *trigger_keys(kind)) for kind in TriggerKind}
+    any_kind = _subtable(top, "trigger", tuple(dict.fromkeys(key for names in keys.values() for key in names)))
+    kind = any_kind.choice("kind", TriggerKind)
+    table = _subtable(top, "trigger", keys[kind])
+    return Trigger(kind, **{key: table.number(key, default) for key, default in trigger_keys(kind).items()})
+
+
+def _read_channel(top: Table) -> Channel:
+    if "channel" not in top:
+        return IDEAL
+    table = _subtable(top, "channel", ("delay", "loss", "seed", "slots"))
+    return Channel(
+        delay=table.number("delay", default=0.0),
+        loss=table.number("loss", default=0.0),
+        seed=table.whole_number("seed") if "seed" in table else IDEAL.seed,
+        slots=table.whole_number("slots") if "slots" in table else IDEAL.slots,
+    )

@@ -5,17 +5,16 @@ import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
+from hybrid_model.consensus.channel_data import IDEAL, Channel
 from hybrid_model.consensus.edge_weights import EdgeWeights
 from hybrid_model.consensus.graphs import Edge, complete_edges, validate_edges
 from hybrid_model.consensus.switching import Switching
 from hybrid_model.consensus.tables import ScenarioError
-from hybrid_model.consensus.thresholds import exponential_threshold
+from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
 from hybrid_model.consensus.weights import ConstantWeight, Waveform
 
 __all__ = [
+    "Channel",
     "Network",
     "Scenario",
     "Trigger",
@@ -39,13 +38,6 @@ class WeightKind(enum.Enum):
 
     GATED_SINE = "gated-sine"
     CONSTANT = "constant"
-
-
-class TriggerKind(enum.Enum):
-    """The trigger functions of the paper, section 4."""
-
-    STATIC = "static"
-    DYNAMIC = "dynamic"
 
 
 @dataclass(frozen=True)
@@ -123,46 +115,6 @@ class Weights:
 
 
 @dataclass(frozen=True)
-class Trigger:
-    """The trigger ``|xhat_i - x_i| > threshold*exp(-decay*t)`` (paper, section 4).
-
-    Parameters
-    ----------
-    kind : TriggerKind
-        STATIC has no decay.
-    threshold : float
-        c > 0, in the unit of the states.
-    decay : float
-        beta >= 0 [1/s].
-
-    Raises
-    ------
-    ScenarioError
-        If a number is out of range, or a static trigger is given a decay.
-    """
-
-    kind: TriggerKind
-    threshold: float
-    decay: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        _require_positive("[trigger] threshold", self.threshold)
-        _require_finite("[trigger] decay", self.decay)
-        if self.decay < 0:
-            raise ScenarioError(f"[trigger] decay is {self.decay}; it must not be negative.")
-        if self.kind is TriggerKind.STATIC and self.decay != 0:
-            raise ScenarioError(
-                f"[trigger] decay is {self.decay}, but the static trigger has a constant threshold; "
-                "leave decay out or set kind = 'dynamic'."
-            )
-
-    def level(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The threshold at time `t` [s]."""
-        return np.asarray(exponential_threshold(self.threshold, self.decay, np.asarray(t, dtype=float)))
-
-
-@dataclass(frozen=True)
 class Scenario:
     """Everything that a run needs.
 
@@ -180,6 +132,8 @@ class Scenario:
         Which edges are active when; ``NoSwitching(edge_count)`` for all of them at all times.
     trigger : Trigger
         When an agent broadcasts.
+    channel : Channel
+        Delay and loss of broadcasts; by default there is neither.
 
     Raises
     ------
@@ -193,6 +147,7 @@ class Scenario:
     weights: Weights
     switching: Switching
     trigger: Trigger
+    channel: Channel = IDEAL
 
     def __post_init__(self) -> None:
         """Check that the parts fit."""
@@ -226,20 +181,25 @@ def replace_trigger(scenario: Scenario, kind: TriggerKind | str) -> Scenario:
     Raises
     ------
     ScenarioError
-        If the kind is unknown, or a dynamic trigger is asked for and there is no decay to use.
+        If the kind is unknown, or the scenario's trigger has not the numbers that it needs.
     """
     names = [member.value for member in TriggerKind]
     if isinstance(kind, str) and kind not in names:
         raise ScenarioError(f"trigger kind is '{kind}'; it must be one of {', '.join(names)}.")
-    wanted = TriggerKind(kind)
-    if wanted is scenario.trigger.kind:
+    wanted, given = TriggerKind(kind), scenario.trigger
+    if wanted is given.kind:
         return scenario
-    if wanted is TriggerKind.DYNAMIC:
+    if wanted is TriggerKind.STATIC and given.threshold > 0:
+        return replace(scenario, trigger=Trigger(wanted, given.threshold))
+    if wanted is TriggerKind.DYNAMIC and given.kind is TriggerKind.STATIC:
         raise ScenarioError(
             f"scenario '{scenario.name}' has the static trigger and so no decay for a dynamic one; "
             "give it a trigger with kind = 'dynamic' and a decay."
         )
-    return replace(scenario, trigger=Trigger(wanted, scenario.trigger.threshold))
+    raise ScenarioError(
+        f"the trigger '{given.kind.value}' of scenario '{scenario.name}' does not have the numbers of the trigger "
+        f"'{wanted.value}'; give it a trigger of that kind with its numbers."
+    )
 
 
 def _require_finite(name: str, value: float) -> None:

@@ -18,3 +18,16 @@ def exponential_threshold(threshold: Value, decay: Value, t: Value) -> Value:
         Time in s.
     """
     return threshold * np.exp(-decay * t)
+
+
+def mixed_threshold(offset: Value, threshold: Value, decay: Value, t: Value) -> Value:
+    """Return ``c0 + c1 exp(-beta t)`` (Seyboth, Dimarogonas, Johansson, Automatica 49 (2013) 245-252).
+
+    Parameters
+    ----------
+    offset, threshold, decay : float, array or symbol
+        c0 and c1, in the unit of the states, and beta in 1/s.
+    t : float, array or symbol
+        Time in s.
+    """
+    return offset + exponential_threshold(threshold, decay, t)

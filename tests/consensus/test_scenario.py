@@ -220,7 +220,7 @@ class TestValues:
         ("switching.active", [1, 2], r"active\[1\] is 1; it must be a list of whole numbers"),
         ("switching.active", [[1], [3]], "phase 2 names edge 3; edges are numbered from 1 to 2"),
         ("switching.active", [[1, 1]], "each edge may be listed only once"),
-        ("trigger.kind", "periodic", "kind is 'periodic'; it must be one of 'static', 'dynamic'"),
+        ("trigger.kind", "quarterly", "kind is 'quarterly'; it must be one of 'static', 'dynamic'"),
         ("trigger.kind", "static", "decay is 0.1, but the static trigger has a constant threshold"),
         ("trigger.threshold", 0, "threshold is 0.0; it must be positive"),
         ("trigger.threshold", MISSING, "has no 'threshold'"),
