@@ -330,6 +330,19 @@ def test_smooth_functions_take_few_points_and_noise_does_not_end_in_halving():
     assert error[0] > 0.1
 
 
+@settings(deadline=None)
+@given(st.integers(1, 9), st.floats(0.1, 3.0), st.sampled_from([np.sin, np.cos, np.tanh]))
+def test_symmetric_functions_are_no_straight_lines(power, rate, shape):
+    def function(t):
+        return np.array([shape(rate * (t - 0.5)) ** power])
+
+    found, error = interpolate(function, 0.0, 1.0, np.array([1e-12]))
+    # Between the points that were checked the error may be a little larger.
+    assert error[0] <= 1e-12
+    grid = np.linspace(0.0, 1.0, 101)
+    assert np.max(np.abs(found(grid)[0] - [function(t)[0] for t in grid])) <= 1e-11
+
+
 def test_a_function_that_is_not_a_number_somewhere_ends():
     found, error = interpolate(lambda t: np.array([np.nan if t > 0.4 else t, t]), 0.0, 1.0, np.array([1e-14, 1e-14]))
     assert len(found.parts) == 1
