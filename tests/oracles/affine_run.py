@@ -105,7 +105,7 @@ def exact_run(system: System, max_events: int) -> ExactRun:
             index = run.due()
             if index is not None:
                 run.jump(index)
-            elif run.t >= run.t_end:
+            elif run.t_end - run.t <= SAME:
                 return ExactRun(tuple(run.events), run.t, tuple(run.x), run.mode, cut=False)
             else:
                 run.flow()
@@ -137,7 +137,7 @@ class _Run:
 
     def u(self):
         """The input, continuous from the right."""
-        reached = [value for t, value in self.system.u if self.number(t) <= self.t]
+        reached = [value for t, value in self.system.u if self.number(t) <= self.t + self.number(SAME)]
         return self.number(reached[-1]) if reached else self.number(0)
 
     def margin(self, k):
@@ -205,7 +205,7 @@ class _Run:
         mode, u = self.system.modes[self.mode], self.u()
         path = self.system.flow(self.x, mode, u)
         stops = [self.time(k) for k in self.ticks] + [self.number(t) for t, _ in self.system.u]
-        known = [t for t in stops if t > self.t] + [self.t_end]
+        known = [t for t in stops if t - self.t > SAME] + [self.t_end]
         rises = {}
         for k in filter(self.enabled, self.guards):
             rate = self.number(self.kinds[k].drift)
