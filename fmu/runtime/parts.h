@@ -155,6 +155,7 @@ bool evaluate_margins(Engine *engine, double t, const double *x, const double *z
 bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin);
 /* Whether the point may flow as far as the flow set says; *level is the margin to be kept. */
 bool flow_may_begin(Engine *engine, const Point *point, double *level);
+
 /* locate.c */
 /* Looks for the first event on the present step; FLOW_EVENT moves the point there. */
 FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end);
