@@ -5,15 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.consensus.agents import DynamicTrigger, EventGenerator, Integrator, StaticTrigger, agent
+from hybrid_model.consensus.agents import agent
+from hybrid_model.consensus.channels import LossyChannel, link_seeds
+from hybrid_model.consensus.continuous import ContinuousIntegrator
 from hybrid_model.consensus.edges import (
     ConstantWeights,
     GatedAbsoluteSineWeights,
     GatedSineWeights,
     PeriodicSwitching,
 )
+from hybrid_model.consensus.integrator import Integrator
 from hybrid_model.consensus.scenario_data import Scenario, TriggerKind
 from hybrid_model.consensus.switching import NoSwitching
+from hybrid_model.consensus.trigger_blocks import Surroundings, trigger_block
 from hybrid_model.consensus.weights import ConstantWeight, WeightMap
 
 
@@ -35,16 +39,26 @@ def scenario_agents(scenario: Scenario) -> dict[str, hm.Composition]:
     dict
         Agent name -> automaton with inputs ``neighbours`` (in the order of the agent's edges) and outputs ``x``,
         ``broadcast`` and ``events``.
+
+    Raises
+    ------
+    ScenarioError
+        If the trigger cannot be had with the scenario's weights or channel.
     """
     return {agent_name(i): _agent(scenario, i) for i in range(1, scenario.network.agents + 1)}
 
 
 def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
-    """Return which broadcasts each agent receives, as ``"agent1.neighbours"`` -> ``["agent2.broadcast", ...]``."""
+    """Return which broadcasts each agent receives, as ``"agent1.neighbours"`` -> ``["agent2.broadcast", ...]``.
+
+    Over a channel that delays or loses broadcasts, agents also receive the senders' counts, as ``"agent1.sent"``.
+    """
     wires = {}
     for i in range(1, scenario.network.agents + 1):
         others = [_other_end(scenario, edge, i) for edge in _edges_of(scenario, i)]
         wires[f"{agent_name(i)}.neighbours"] = [f"{agent_name(j)}.broadcast" for j in others]
+        if others and not scenario.channel.ideal:
+            wires[f"{agent_name(i)}.sent"] = [f"{agent_name(j)}.events" for j in others]
     return wires
 
 
@@ -65,20 +79,35 @@ def _other_end(scenario: Scenario, edge: int, number: int) -> int:
 def _agent(scenario: Scenario, number: int) -> hm.Composition:
     edges = _edges_of(scenario, number)
     initial = scenario.network.initial[number - 1]
+    motion = ContinuousIntegrator if scenario.trigger.kind is TriggerKind.CONTINUOUS else Integrator
     return agent(
         agent_name(number),
-        Integrator(degree=len(edges), x=initial, gain=scenario.network.gain),
+        motion(degree=len(edges), x=initial, gain=scenario.network.gain),
         _weights(scenario, edges),
-        _trigger(scenario),
+        _trigger(scenario, edges),
         _switching(scenario, edges),
+        _channel(scenario, number, edges),
     )
 
 
-def _trigger(scenario: Scenario) -> EventGenerator:
-    trigger = scenario.trigger
-    if trigger.kind is TriggerKind.STATIC:
-        return StaticTrigger(threshold=trigger.threshold)
-    return DynamicTrigger(threshold=trigger.threshold, decay=trigger.decay)
+def _trigger(scenario: Scenario, edges: list[int]) -> hm.HybridAutomaton:
+    waveforms = [scenario.weights.waveforms[k] for k in edges]
+    around = Surroundings(edges, waveforms, scenario.switching, scenario.network.gain)
+    return trigger_block(scenario.trigger, around)
+
+
+def _channel(scenario: Scenario, number: int, edges: list[int]) -> hm.HybridAutomaton | None:
+    channel = scenario.channel
+    if channel.ideal or not edges:
+        return None
+    senders = [_other_end(scenario, edge, number) for edge in edges]
+    return LossyChannel(
+        degree=len(edges),
+        slots=channel.slots,
+        delay=channel.delay,
+        loss=channel.loss,
+        random=link_seeds(channel.seed, number, senders),
+    )
 
 
 def _weights(scenario: Scenario, edges: list[int]) -> hm.Automaton:

@@ -154,6 +154,10 @@ class Scenario:
         if not self.name:
             raise ScenarioError("name is empty; a scenario needs a name for its reports.")
         _require_positive("stop_time", self.stop_time)
+        if self.trigger.kind is TriggerKind.CONTINUOUS and not self.channel.ideal:
+            raise ScenarioError(
+                "[channel] delays or loses broadcasts, but the trigger 'continuous' sends none; leave [channel] out."
+            )
         edge_count = len(self.network.edges)
         counts = {"[weights]": len(self.weights.waveforms), "[switching]": self.switching.edge_count}
         for table, count in counts.items():

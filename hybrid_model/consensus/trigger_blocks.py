@@ -1,0 +1,127 @@
+"""From the trigger of a scenario to the automaton of one agent's event generator."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import hybrid_model as hm
+from hybrid_model.consensus.continuous import ContinuousBroadcast
+from hybrid_model.consensus.relative_triggers import GirardTrigger, RelativeTrigger
+from hybrid_model.consensus.self_triggers import ConstantSelfTrigger, GatedSineSelfTrigger
+from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching, Switching
+from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.timed_triggers import PeriodicBroadcast, SampledTrigger
+from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.triggers import DynamicTrigger, MixedTrigger, StaticTrigger
+from hybrid_model.consensus.weights import ConstantWeight, GatedSine, Waveform, WeightMap
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What an event generator may know of the agent that it belongs to.
+
+    Attributes
+    ----------
+    edges : sequence of int
+        The agent's edges, as indices from 0 into the network's list.
+    waveforms : sequence of Waveform
+        Their weights.
+    switching : Switching
+        When which edges of the network are active.
+    gain : float
+        Control gain k.
+    """
+
+    edges: Sequence[int]
+    waveforms: Sequence[Waveform]
+    switching: Switching
+    gain: float
+
+
+def trigger_block(trigger: Trigger, around: Surroundings) -> hm.Automaton:
+    """Make the event generator of one agent.
+
+    Parameters
+    ----------
+    trigger : Trigger
+        The law and its numbers.
+    around : Surroundings
+        The agent's edges, for the laws that know them.
+
+    Returns
+    -------
+    Automaton
+        With an input ``x``, outputs ``broadcast`` and ``events``, and inputs ``neighbours`` and ``weights`` where the
+        law needs them.
+
+    Raises
+    ------
+    ScenarioError
+        If a self-triggered agent has weights whose future it cannot compute.
+    """
+    numbers = trigger
+    degree = len(around.edges)
+    match trigger.kind:
+        case TriggerKind.STATIC:
+            return StaticTrigger(threshold=numbers.threshold)
+        case TriggerKind.DYNAMIC:
+            return DynamicTrigger(threshold=numbers.threshold, decay=numbers.decay)
+        case TriggerKind.MIXED:
+            return MixedTrigger(threshold=numbers.threshold, decay=numbers.decay, offset=numbers.offset)
+        case TriggerKind.RELATIVE:
+            return RelativeTrigger(degree=degree, sigma=numbers.sigma, floor=numbers.floor, decay=numbers.decay)
+        case TriggerKind.GIRARD:
+            return GirardTrigger(
+                degree=degree,
+                sigma=numbers.sigma,
+                theta=numbers.theta,
+                leak=numbers.leak,
+                eta=numbers.reserve,
+                gain=around.gain,
+            )
+        case TriggerKind.SAMPLED:
+            return SampledTrigger(threshold=numbers.threshold, decay=numbers.decay, period=numbers.period)
+        case TriggerKind.PERIODIC:
+            return PeriodicBroadcast(period=numbers.period)
+        case TriggerKind.CONTINUOUS:
+            return ContinuousBroadcast()
+        case TriggerKind.SELF_TRIGGERED:
+            return _self_trigger(trigger, around)
+
+
+def _self_trigger(trigger: Trigger, around: Surroundings) -> hm.Automaton:
+    edges = around.edges
+    if not edges:
+        # Nobody to hear and nothing that moves the state: the dynamic trigger never fires either.
+        return DynamicTrigger(threshold=trigger.threshold, decay=trigger.decay)
+    common = {"threshold": trigger.threshold, "decay": trigger.decay, "gain": around.gain}
+    schedule: dict[str, object] = {"active": [[1.0] * len(edges)]}
+    if isinstance(around.switching, PeriodicSwitching):
+        active = [[float(k + 1 in row) for k in edges] for row in around.switching.active]
+        schedule = {"active": active, "dwell": around.switching.dwell}
+    elif not isinstance(around.switching, NoSwitching):
+        raise ScenarioError(_unknown_future(f"switching {type(around.switching).__name__}"))
+    constant = [waveform for waveform in around.waveforms if isinstance(waveform, ConstantWeight)]
+    if len(constant) == len(edges):
+        return ConstantSelfTrigger(level=[waveform.level for waveform in constant], **common, **schedule)
+    gated = [waveform for waveform in around.waveforms if isinstance(waveform, GatedSine)]
+    if len(gated) < len(edges):
+        raise ScenarioError(_unknown_future(f"weights {type(around.waveforms[0]).__name__}"))
+    return GatedSineSelfTrigger(
+        gate_rate=[waveform.gate_rate for waveform in gated],
+        sine_rate=[waveform.sine_rate for waveform in gated],
+        duty_percent=[waveform.duty_percent for waveform in gated],
+        phase=[waveform.phase for waveform in gated],
+        squared=float(gated[0].map is WeightMap.SQUARE),
+        **common,
+        **schedule,
+    )
+
+
+def _unknown_future(what: str) -> str:
+    return (
+        f"[trigger] kind is 'self-triggered', but no self-triggered agent can compute ahead over {what}; it knows "
+        "constant and gated-sine weights, switched periodically or not at all. Take kind = 'dynamic', which gives the "
+        "same broadcasts."
+    )
