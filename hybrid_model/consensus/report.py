@@ -80,13 +80,20 @@ def run_report(scenario: Scenario, arc: HybridArc) -> RunReport:
     states = np.array([arc[f"{name}.x"] for name in names])
     mean = states.mean(axis=0)
     return RunReport(
-        event_times=[arc.event_times(f"{name}.trigger.broadcast") for name in names],
+        event_times=[broadcast_times(arc, name) for name in names],
         x_end=states[:, -1],
         edge_norm_end=edge_norm(scenario, states[:, -1]),
         mean_drift=float(np.max(np.abs(mean - mean[0]))),
         stop=arc.stop.name,
         message=arc.message,
     )
+
+
+def broadcast_times(arc: HybridArc, name: str) -> FloatArray:
+    """Return the times in s of an agent's broadcasts; none for an agent that broadcasts continuously."""
+    jump = f"{name}.trigger.broadcast"
+    sends = any(info.name == jump for info in arc.automaton.jumps)
+    return arc.event_times(jump) if sends else np.empty(0)
 
 
 def edge_norm(scenario: Scenario, x: FloatArray) -> Any:
