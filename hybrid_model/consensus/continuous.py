@@ -8,9 +8,9 @@ from hybrid_model.variables import Value
 
 
 class ContinuousIntegrator(Integrator):
-    """The single integrator under the consensus protocol on states: ``x' = -k sum_j w_j(t) (x - x_j)`` (paper, section 3).
+    """The single integrator under the consensus protocol on states (paper, section 3).
 
-    Its neighbours' values change along flows, so agents of this kind are composed to one automaton; they do not meet at
+    ``x' = -k sum_j w_j(t) (x - x_j)`` over the neighbours j. Its neighbours' values change along flows, so agents of this kind are composed to one automaton; they do not meet at
     events only.
     """
 

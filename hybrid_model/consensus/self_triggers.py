@@ -4,8 +4,8 @@ With known weights the error between two messages is known too,
 
     e(t) = e(t0) + k sum_j (xhat - xhat_j) integral of w_j from t0 to t,
 
-so the agent needs no measurement until it broadcasts: it computes the time at which ``|e| = c exp(-beta t)`` and sets an
-alarm. It computes anew with each message of a neighbour and where a weight has a breakpoint. The broadcasts are those
+so the agent needs no measurement until it broadcasts: it computes the time at which ``|e| = c exp(-beta t)`` and sets
+an alarm. It computes anew with each message of a neighbour and where a weight has a breakpoint. The broadcasts are those
 of the dynamic trigger (D. V. Dimarogonas, E. Frazzoli, K. H. Johansson, IEEE Trans. Automatic Control 57 (2012)
 1291-1297, section on self-triggered control; audit, section 11).
 """
@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
@@ -82,7 +81,12 @@ class SelfTrigger(EventGenerator):
     def start_map(self, s: hm.Values) -> dict[str, Value]:
         """The first broadcast, and the first plan."""
         pieces = self.at_time(s)
-        return {**super().start_map(s), "heard": s.neighbours, **pieces, **self._plan(s, pieces, 0.0, s.x, s.neighbours)}
+        return {
+            **super().start_map(s),
+            "heard": s.neighbours,
+            **pieces,
+            **self._plan(s, pieces, 0.0, s.x, s.neighbours),
+        }
 
     def predicted(self, s: hm.Values) -> Value:
         """The error now, from the last plan."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import hybrid_model as hm
 from hybrid_model.consensus.continuous import ContinuousBroadcast
@@ -39,13 +40,13 @@ class Surroundings:
     gain: float
 
 
-def trigger_block(trigger: Trigger, around: Surroundings) -> hm.Automaton:
+def trigger_block(trigger: Trigger, around: Surroundings) -> hm.HybridAutomaton:
     """Make the event generator of one agent.
 
     Parameters
     ----------
     trigger : Trigger
-        The law and its numbers.
+        The law and its trigger.
     around : Surroundings
         The agent's edges, for the laws that know them.
 
@@ -60,51 +61,50 @@ def trigger_block(trigger: Trigger, around: Surroundings) -> hm.Automaton:
     ScenarioError
         If a self-triggered agent has weights whose future it cannot compute.
     """
-    numbers = trigger
     degree = len(around.edges)
     match trigger.kind:
         case TriggerKind.STATIC:
-            return StaticTrigger(threshold=numbers.threshold)
+            return StaticTrigger(threshold=trigger.threshold)
         case TriggerKind.DYNAMIC:
-            return DynamicTrigger(threshold=numbers.threshold, decay=numbers.decay)
+            return DynamicTrigger(threshold=trigger.threshold, decay=trigger.decay)
         case TriggerKind.MIXED:
-            return MixedTrigger(threshold=numbers.threshold, decay=numbers.decay, offset=numbers.offset)
+            return MixedTrigger(threshold=trigger.threshold, decay=trigger.decay, offset=trigger.offset)
         case TriggerKind.RELATIVE:
-            return RelativeTrigger(degree=degree, sigma=numbers.sigma, floor=numbers.floor, decay=numbers.decay)
+            return RelativeTrigger(degree=degree, sigma=trigger.sigma, floor=trigger.floor, decay=trigger.decay)
         case TriggerKind.GIRARD:
             return GirardTrigger(
                 degree=degree,
-                sigma=numbers.sigma,
-                theta=numbers.theta,
-                leak=numbers.leak,
-                eta=numbers.reserve,
+                sigma=trigger.sigma,
+                theta=trigger.theta,
+                leak=trigger.leak,
+                eta=trigger.reserve,
                 gain=around.gain,
             )
         case TriggerKind.SAMPLED:
-            return SampledTrigger(threshold=numbers.threshold, decay=numbers.decay, period=numbers.period)
+            return SampledTrigger(threshold=trigger.threshold, decay=trigger.decay, period=trigger.period)
         case TriggerKind.PERIODIC:
-            return PeriodicBroadcast(period=numbers.period)
+            return PeriodicBroadcast(period=trigger.period)
         case TriggerKind.CONTINUOUS:
             return ContinuousBroadcast()
         case TriggerKind.SELF_TRIGGERED:
             return _self_trigger(trigger, around)
 
 
-def _self_trigger(trigger: Trigger, around: Surroundings) -> hm.Automaton:
+def _self_trigger(trigger: Trigger, around: Surroundings) -> hm.HybridAutomaton:
     edges = around.edges
     if not edges:
         # Nobody to hear and nothing that moves the state: the dynamic trigger never fires either.
         return DynamicTrigger(threshold=trigger.threshold, decay=trigger.decay)
-    common = {"threshold": trigger.threshold, "decay": trigger.decay, "gain": around.gain}
-    schedule: dict[str, object] = {"active": [[1.0] * len(edges)]}
+    common: dict[str, Any] = {"threshold": trigger.threshold, "decay": trigger.decay, "gain": around.gain}
+    common["active"] = [[1.0] * len(edges)]
     if isinstance(around.switching, PeriodicSwitching):
-        active = [[float(k + 1 in row) for k in edges] for row in around.switching.active]
-        schedule = {"active": active, "dwell": around.switching.dwell}
+        common["active"] = [[float(k + 1 in row) for k in edges] for row in around.switching.active]
+        common["dwell"] = around.switching.dwell
     elif not isinstance(around.switching, NoSwitching):
         raise ScenarioError(_unknown_future(f"switching {type(around.switching).__name__}"))
     constant = [waveform for waveform in around.waveforms if isinstance(waveform, ConstantWeight)]
     if len(constant) == len(edges):
-        return ConstantSelfTrigger(level=[waveform.level for waveform in constant], **common, **schedule)
+        return ConstantSelfTrigger(level=[waveform.level for waveform in constant], **common)
     gated = [waveform for waveform in around.waveforms if isinstance(waveform, GatedSine)]
     if len(gated) < len(edges):
         raise ScenarioError(_unknown_future(f"weights {type(around.waveforms[0]).__name__}"))
@@ -115,7 +115,6 @@ def _self_trigger(trigger: Trigger, around: Surroundings) -> hm.Automaton:
         phase=[waveform.phase for waveform in gated],
         squared=float(gated[0].map is WeightMap.SQUARE),
         **common,
-        **schedule,
     )
 
 
