@@ -62,7 +62,7 @@ def agent(
         names |= {f"channel.{item.name}": item.name for item in channel.of_kind(Kind.INPUT)}
         if "neighbours" in wanted:
             connections["trigger.neighbours"] = "channel.received"
-    shown = {item.name for item in (*trigger.variables, *trigger.clocks)}
+    shown = {variable.name for variable in trigger.variables} | {clock.name for clock in trigger.clocks}
     names |= {f"trigger.{item}": item for item in SHOWN if item in shown}
     return hm.Composition(name, {**parts, "integrator": integrator, "trigger": trigger}, connections, names)
 

@@ -3,8 +3,8 @@
 With ``V = |x - mean(x)|**2/2``, ``e = xhat - x``, ``l_ii = sum_j w_ij`` and
 ``q_i = 1/2 sum_j w_ij (xhat_j - xhat_i)**2`` the consensus protocol gives, for undirected weights that may vary in
 time, ``V' <= -k sum_i (q_i/2 - l_ii e_i**2)`` (audit, section 11). Both laws keep ``l_ii e_i**2`` below a share of
-``q_i/2``. They hear the neighbours' broadcasts and know the weights of their own edges at the present time; nothing is measured at
-the neighbours between events.
+``q_i/2``. They hear the neighbours' broadcasts and know the weights of their own edges at the present time; nothing is
+measured at the neighbours between events.
 
 An agent may fire at the very instant of a neighbour's broadcast, which lowers its ``q_i``. It fires at most once at an
 instant: its error is then zero, and both conditions are false with room to spare.

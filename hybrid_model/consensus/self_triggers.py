@@ -5,8 +5,8 @@ With known weights the error between two messages is known too,
     e(t) = e(t0) + k sum_j (xhat - xhat_j) integral of w_j from t0 to t,
 
 so the agent needs no measurement until it broadcasts: it computes the time at which ``|e| = c exp(-beta t)`` and sets
-an alarm. It computes anew with each message of a neighbour and where a weight has a breakpoint. The broadcasts are those
-of the dynamic trigger (D. V. Dimarogonas, E. Frazzoli, K. H. Johansson, IEEE Trans. Automatic Control 57 (2012)
+an alarm. It computes anew with each message of a neighbour and where a weight has a breakpoint. The broadcasts are
+those of the dynamic trigger (D. V. Dimarogonas, E. Frazzoli, K. H. Johansson, IEEE Trans. Automatic Control 57 (2012)
 1291-1297, section on self-triggered control; audit, section 11).
 """
 
