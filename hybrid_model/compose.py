@@ -54,7 +54,8 @@ class Composition(Automaton):
     parts : mapping
         Part name -> automaton. The order of the mapping is the order of simultaneous jumps.
     connections : mapping
-        ``"part.input"`` -> ``"part.output"``, or a sequence of such names for the elements of a vector input.
+        ``"part.input"`` -> ``"part.output"``, or a sequence of such names for the elements of a vector input, for the
+        rows of a matrix.
     names : mapping, optional
         ``"part.variable"`` -> name in the composition, where the scoped name is not wanted.
 
@@ -278,7 +279,7 @@ def _wires(composition: Composition, connections: Mapping[str, Source]) -> dict[
         given = [source] if isinstance(source, str) else list(source)
         found = [_find(composition, name, (Kind.STATE, Kind.DISCRETE, Kind.OUTPUT), "an output") for name in given]
         stacked = not isinstance(source, str)
-        if stacked and variable.shape != (len(found),):
+        if stacked and variable.shape[:1] != (len(found),):
             raise WiringError(
                 f"{composition.name}: {target} has shape {variable.shape}, but {len(found)} signals are connected to "
                 "it: connect one for each element."

@@ -10,8 +10,8 @@ from hybrid_model.variables import Value
 class ContinuousIntegrator(Integrator):
     """The single integrator under the consensus protocol on states (paper, section 3).
 
-    ``x' = -k sum_j w_j(t) (x - x_j)`` over the neighbours j. Their values change along flows, so agents of this kind are
-    composed to one automaton; they do not meet at events only.
+    ``x' = -k sum_j w_j(t) (x - x_j)`` over the neighbours j. Their values change along flows, so agents of this kind
+    are composed to one automaton; they do not meet at events only.
     """
 
     broadcast = hm.Input(0.0, description="state of the agent itself")
