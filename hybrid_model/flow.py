@@ -234,21 +234,30 @@ class _Watch:
 
     def _first_in_panel(self, piece: FlowPiece, a: float, b: float) -> tuple[float, int] | None:
         times = scan_times(a, b)
+        table = self._table(piece, times)
+        if table.shape[1] > self._guards and table[0, -1] >= 0.0:
+            return a, self._guards
+        first: tuple[float, int] | None = None
+        candidates = may_rise(table)
+        for row in self._watched:
+            if not candidates[row]:
+                continue
+            bracket = first_rise(times, table[:, row], lambda at, row=row: self._table(piece, at)[:, row])
+            if bracket is None:
+                continue
+            first = first_nonnegative(self._along(piece, row), *bracket), row
+            # The others count only if they are earlier still.
+            times = scan_times(a, first[0])
+            table = self._table(piece, times)
+            candidates &= may_rise(table)
+        return first
+
+    def _table(self, piece: FlowPiece, times: FloatArray) -> FloatArray:
+        """Return the margins as `_margins` does, at several times of a step."""
         table = self._execution.margins_along(times, piece.sample(times))
         if table.shape[1] > self._guards:
             table[:, -1] = -table[:, -1] - self._slack
-            if table[0, -1] >= 0.0:
-                return a, self._guards
-        candidates = may_rise(table)
-        found = [
-            (first_nonnegative(margin, *bracket), row)
-            for row in self._watched
-            if candidates[row]
-            for margin in [self._along(piece, row)]
-            for bracket in [first_rise(times, table[:, row], margin)]
-            if bracket is not None
-        ]
-        return min(found) if found else None
+        return table
 
     def raise_levels(self, piece: FlowPiece) -> None:
         """Enable the guards that would cross within the tolerance if the flow did not end with this piece (rule 6).

@@ -12,6 +12,8 @@ halving of the step: all smooth margins, and exactly those that are affine in th
 the default solver is such a polynomial. A kink ends the halving where the margin cannot be near zero, or after
 `HALVINGS` of them. What can be missed is a feature that no sample shows: a peak, sharp against the distance of
 neighbouring samples, which is at most a fifth of the step. More `scan_points` or a `max_step` make that smaller.
+
+The C engine of exported FMUs (fmu/runtime/rises.c) decides in the same way.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ from hybrid_model.variables import FloatArray
 
 BoolArray = npt.NDArray[np.bool_]
 Margin = Callable[[float], float]
+MarginAtTimes = Callable[[FloatArray], FloatArray]
 SMALLEST = float(np.finfo(np.float64).tiny)
 DEGREE = 8
 """Degree of the polynomials; the dense output of DOP853 has degree 7."""
@@ -40,6 +43,7 @@ def _matrices(degree: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the points on [0, 1], and what makes Bernstein and the last two Chebyshev coefficients of samples."""
     k = np.arange(degree + 1)
     points = 0.5 - 0.5 * np.cos(np.pi * k / degree)
+    points[degree // 2] = 0.5  # exactly, so that a touch there is seen
     bernstein = comb(degree, k) * points[:, None] ** k * (1.0 - points[:, None]) ** (degree - k)
     chebyshev = np.polynomial.chebyshev.chebvander(2.0 * points - 1.0, degree)
     to_bernstein, to_chebyshev = (np.linalg.inv(np.asarray(m, dtype=np.float64)) for m in (bernstein, chebyshev))
@@ -72,17 +76,17 @@ def may_rise(samples: FloatArray) -> BoolArray:
     Returns
     -------
     ndarray of bool, shape (m,)
-        False only where the polynomial through the samples and its tail exclude it.
+        False only where the samples exclude it.
     """
-    # Samples that are not finite give coefficients that are no numbers, and those count as a rise.
+    # Samples that are not finite give bounds that are no numbers, and those count as a rise.
     with np.errstate(invalid="ignore"):
         bounds = TO_BERNSTEIN @ samples
         tail = np.abs(TO_TAIL @ samples).sum(axis=0)
-    excluded: BoolArray = (bounds.max(axis=0) + tail < 0.0) | (bounds.min(axis=0) - tail >= 0.0)
+        excluded: BoolArray = (bounds.max(axis=0) + tail < 0.0) | (bounds.min(axis=0) - tail >= 0.0)
     return ~excluded
 
 
-def first_rise(times: FloatArray, samples: FloatArray, margin: Margin) -> tuple[float, float] | None:
+def first_rise(times: FloatArray, samples: FloatArray, margin: MarginAtTimes) -> tuple[float, float] | None:
     """Find the first bracket (a, b] in which a margin rises from negative to zero or above.
 
     Parameters
@@ -90,32 +94,33 @@ def first_rise(times: FloatArray, samples: FloatArray, margin: Margin) -> tuple[
     times, samples : ndarray, shape (DEGREE + 1,)
         Scan times in s, and the margin there.
     margin : callable
-        The margin as a function of time.
+        The margin at an array of times.
 
     Returns
     -------
     (float, float) or None
         Times with margin(a) < 0 <= margin(b).
     """
-    waiting = [(times, samples)]
+    waiting: list[tuple[float, float]] = []
     halvings = 0
-    while waiting:
-        times, samples = waiting.pop()
+    while True:
         sure, bracket = _judge(times, samples)
         if not sure and halvings < HALVINGS and times[-1] - times[0] > DEGREE**2 * ulp(times[-1]):
             halvings += 1
             middle = 0.5 * (float(times[0]) + float(times[-1]))
-            halves = [scan_times(float(times[0]), middle), scan_times(middle, float(times[-1]))]
-            sampled = [(half, np.array([margin(float(t)) for t in half])) for half in halves]
-            waiting += reversed(sampled)
+            # The first half is looked at first, so it comes last.
+            waiting += [(middle, float(times[-1])), (float(times[0]), middle)]
         elif bracket is not None:
             return bracket
-    return None
+        if not waiting:
+            return None
+        times = scan_times(*waiting.pop())
+        samples = margin(times)
 
 
 def _judge(times: FloatArray, samples: FloatArray) -> tuple[bool, tuple[float, float] | None]:
     """Return whether the samples settle where the margin rises first, and the bracket that they show."""
-    if not np.all(np.isfinite(samples)):
+    if not np.isfinite(samples).all():
         return True, _between_samples(times, samples)
     bounds = TO_BERNSTEIN @ samples
     tail = float(np.abs(TO_TAIL @ samples).sum())

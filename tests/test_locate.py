@@ -18,7 +18,7 @@ def first_rise(margin, a, b, panels=1):
     for start, end in itertools.pairwise(np.linspace(a, b, panels + 1)):
         times = scan_times(start, end)
         samples = np.array([margin(t) for t in times])
-        bracket = hybrid_model.locate.first_rise(times, samples, margin)
+        bracket = hybrid_model.locate.first_rise(times, samples, lambda at: np.array([margin(t) for t in at]))
         if bracket is not None:
             assert may_rise(samples[:, None])[0]
             return first_nonnegative(margin, *bracket)
