@@ -12,7 +12,7 @@ import numpy as np
 
 from hybrid_model.errors import SimulationError
 from hybrid_model.layout import not_finite
-from hybrid_model.locate import DEGREE, first_nonnegative, first_rise, may_rise, scan_times, ulp
+from hybrid_model.locate import DEGREE, MarginAtTimes, first_nonnegative, first_rise, may_rise, scan_times, ulp
 from hybrid_model.transitions import Priority
 from hybrid_model.variables import FloatArray, Kind
 
@@ -88,7 +88,7 @@ def integrate(execution: Execution, limit: float, time_event: float) -> tuple[li
             pieces.append(_move(execution, piece))
             continue
         t, left = found
-        x = piece.at(t) if t <= piece.t1 else piece.interpolate(t)
+        x = watch.state(piece, t)
         pieces.append(_move(execution, FlowPiece(piece.t0, t, piece.x0, x, piece.interpolate)))
         if t + execution.solver.event_tolerance > end:
             watch.raise_levels(pieces[-1])
@@ -212,7 +212,19 @@ class _Watch:
         # outside already, it counts beyond the tolerance.
         flow_first = automaton.priority is Priority.FLOW
         self._watched = rows[self._guards :] if flow_first else rows
+        self._beyond: tuple[FlowPiece, FloatArray] | None = None
         self._slack = FLOW_FIRST_SLACK if flow_first and execution.in_flow_set(0.0) else self._tolerance
+
+    def state(self, piece: FlowPiece, t: float) -> FloatArray:
+        """Return the continuous states in a piece, or less than the tolerance after it.
+
+        After it they go on with the derivative at its end: the dense output of a piece of some ulp means nothing there.
+        """
+        if t <= piece.t1:
+            return piece.at(t)
+        if self._beyond is None or self._beyond[0] is not piece:
+            self._beyond = piece, _FlowMap(self._execution, piece.t1)(piece.t1, piece.x1)
+        return piece.x1 + (t - piece.t1) * self._beyond[1]
 
     def _margins(self, t: float, x: FloatArray) -> FloatArray:
         """Return the jump margins and, last, the margin by which the flow set is left."""
@@ -242,7 +254,7 @@ class _Watch:
         for row in self._watched:
             if not candidates[row]:
                 continue
-            bracket = first_rise(times, table[:, row], lambda at, row=row: self._table(piece, at)[:, row])
+            bracket = first_rise(times, table[:, row], self._row_at_times(piece, row))
             if bracket is None:
                 continue
             first = first_nonnegative(self._along(piece, row), *bracket), row
@@ -259,6 +271,13 @@ class _Watch:
             table[:, -1] = -table[:, -1] - self._slack
         return table
 
+    def _row_at_times(self, piece: FlowPiece, row: int) -> MarginAtTimes:
+        def margin(times: FloatArray) -> FloatArray:
+            column: FloatArray = self._table(piece, times)[:, row]
+            return column
+
+        return margin
+
     def raise_levels(self, piece: FlowPiece) -> None:
         """Enable the guards that would cross within the tolerance if the flow did not end with this piece (rule 6).
 
@@ -270,7 +289,7 @@ class _Watch:
             return
         now = self._margins(piece.t1, piece.x1)[: self._guards]
         soon = piece.t1 + self._tolerance
-        then = self._margins(soon, piece.interpolate(soon))[: self._guards]
+        then = self._margins(soon, self.state(piece, soon))[: self._guards]
         execution.levels = np.where((now < 0.0) & (then >= 0.0), now, 0.0)
 
     def go_on_to(self, end: float) -> FlowPiece:
@@ -285,15 +304,14 @@ class _Watch:
 
     def _along(self, piece: FlowPiece, row: int) -> Callable[[float], float]:
         def margin(t: float) -> float:
-            x = piece.at(t) if t <= piece.t1 else piece.interpolate(t)
-            return float(self._margins(t, x)[row])
+            return float(self._margins(t, self.state(piece, t))[row])
 
         return margin
 
     def _latest_of_simultaneous(self, piece: FlowPiece, t: float, end: float) -> float:
         """Move the instant on so that every guard that crosses within the tolerance has crossed (rule 6)."""
         horizon = min(t + self._tolerance, end)
-        x, then = piece.at(t), piece.at(horizon) if horizon <= piece.t1 else piece.interpolate(horizon)
-        crossing = (self._margins(t, x) < 0.0) & (self._margins(horizon, then) >= 0.0)
+        now, then = self._margins(t, self.state(piece, t)), self._margins(horizon, self.state(piece, horizon))
+        crossing = (now < 0.0) & (then >= 0.0)
         rows = np.flatnonzero(crossing[: self._guards])
         return max([t, *(first_nonnegative(self._along(piece, int(row)), t, horizon) for row in rows)])

@@ -220,3 +220,30 @@ def test_a_block_without_events_is_left_alone(exported):
     quiet.save = lambda: pytest.fail("a block that predicts is never saved")
     run_event_exact(System([quiet, busy], {}), 3.1)
     assert calls == [(0.0, 3.1)]
+
+
+class Rest(hm.HybridAutomaton):
+    """Rests outside its flow set by a rounding and drifts by less; every half second something else leaves it."""
+
+    y = hm.State(-1e-14, output=True)
+    w = hm.State(0.5, output=True)
+    hit = hm.Clock("jump")
+
+    def flow_map(self, s):
+        return {"y": -1e-16, "w": -1.0}
+
+    def flow_set(self, s):
+        return hm.least(s.y, s.w)
+
+    def jump_set(self, s):
+        return -s.w
+
+    def jump_map(self, s):
+        return {"w": 0.5}
+
+
+@EXECUTIONS
+def test_a_state_a_rounding_outside_the_flow_set_hides_no_guard(execution, exported):
+    result = run_event_exact(System([slave(execution, Rest(), exported, "rest")], {}), 2.2)
+    assert result.tick_times("a", "hit") == pytest.approx([0.5, 1.0, 1.5, 2.0], abs=1e-12)
+    assert [jump.t for jump in hm.simulate(Rest(), 2.2).jumps] == pytest.approx([0.5, 1.0, 1.5, 2.0], abs=1e-12)

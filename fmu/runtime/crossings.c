@@ -136,6 +136,19 @@ bool first_guard(Search *search, double *t)
     return isfinite(best);
 }
 
+/* The state is outside when it is so by more than the tolerance: rounding may keep it a little outside
+   for as long as it likes. */
+static bool exit_beyond(Search *search, double beyond, Bracket bracket, double *t)
+{
+    search->level -= beyond;
+    bool found = confirm(search, search->exit_row, &bracket);
+    if (found)
+        polish(search, search->exit_row, &bracket);
+    search->level += beyond;
+    *t = bracket.b;
+    return found && !search->failed;
+}
+
 bool first_exit(Search *search, double *t)
 {
     double beyond = search->level < -EVENT_TOLERANCE ? EVENT_TOLERANCE : EVENT_TOLERANCE + search->level;
@@ -147,6 +160,8 @@ bool first_exit(Search *search, double *t)
     begin_rises(&rises, search, search->exit_row, beyond);
     if (!next_rise(&rises, INFINITY, &far))
         return false;
+    if (!search->engine->model->flow_priority)
+        return exit_beyond(search, beyond, far, t);
     /* Back to the crossing that leads there; those before it came back inside. */
     begin_rises(&rises, search, search->exit_row, 0.0);
     while (next_rise(&rises, far.b, &next) && next.a < far.b)

@@ -82,6 +82,8 @@ def test_every_declared_variable_is_readable_right_after_initialisation(name, ex
     path = str(exported(cases()[name].automaton, name))
     description = fmpy.read_model_description(path)
     folder = fmpy.extract(path)
+    # A jump that is due at the start has been taken, or shows in the values already.
+    quiet = hm.Execution(cases()[name].automaton).due() is None
     for events in (False, True):
         fmu = fmpy.fmi3.FMU3Slave(
             guid=description.instantiationToken,
@@ -95,7 +97,7 @@ def test_every_declared_variable_is_readable_right_after_initialisation(name, ex
         for variable in description.modelVariables:
             values = getattr(fmu, f"get{variable.type}")([variable.valueReference])
             assert np.all(np.isfinite(values))
-            if variable.start is not None and variable.type != "Clock":
+            if variable.start is not None and variable.type != "Clock" and quiet:
                 assert float(values[0]) == float(variable.start)
         fmu.terminate()
         fmu.freeInstance()
