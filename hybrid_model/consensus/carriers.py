@@ -2,13 +2,31 @@
 
 import enum
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.gating import Expression, gated_sine, half_wave
 
-__all__ = ["Carrier", "SineCarrier", "UnitCarrier", "WeightMap", "apply_map"]
+__all__ = ["Carrier", "RippleCarrier", "SineCarrier", "UnitCarrier", "WeightMap", "apply_map"]
+
+
+class Carrier(Protocol):
+    """A function of time, at least 0, that is smooth between the breakpoints of its weight.
+
+    Carriers are compared with ``==`` and hashed: edges whose carriers are equal share a shape.
+    """
+
+    @property
+    def rate(self) -> float:
+        """Angular rate [rad/s] of its fastest oscillation between breakpoints; 0.0 if it does not oscillate."""
+
+    def value(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Value at time `t` [s]."""
+
+    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
+        """Integral from `t0` to `t1` [s]."""
 
 
 class WeightMap(enum.Enum):
@@ -28,6 +46,11 @@ def apply_map(g: Expression, weight_map: WeightMap) -> Expression:
 @dataclass(frozen=True)
 class UnitCarrier:
     """The carrier 1 of a weight that is constant on each piece."""
+
+    @property
+    def rate(self) -> float:
+        """0.0: it does not oscillate."""
+        return 0.0
 
     def value(self, t: ArrayLike) -> NDArray[np.float64]:
         """1 at every time `t` [s]."""
@@ -62,4 +85,21 @@ class SineCarrier:
         return np.asarray(2 / self.rate * (2 * (h1 - h0) + cosines))
 
 
-Carrier = UnitCarrier | SineCarrier
+@dataclass(frozen=True)
+class RippleCarrier:
+    """The shape ``1 + depth*sin(rate*t - phase)`` with a depth from 0 to 1; `rate` in rad/s, `phase` in rad."""
+
+    depth: float
+    rate: float
+    phase: float
+
+    def value(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Value at time `t` [s]."""
+        return np.asarray(1 + self.depth * np.sin(self.rate * np.asarray(t, dtype=float) - self.phase))
+
+    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
+        """Integral from `t0` to `t1` [s] in closed form; the difference of cosines is written as a product."""
+        start, end = np.asarray(t0, dtype=float), np.asarray(t1, dtype=float)
+        middle = self.rate * (start + end) / 2 - self.phase
+        wave = 2 / self.rate * np.sin(middle) * np.sin(self.rate * (end - start) / 2)
+        return np.asarray((end - start) + self.depth * wave)

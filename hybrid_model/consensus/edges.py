@@ -36,30 +36,21 @@ class ConstantWeights(hm.HybridAutomaton):
         return {"weights": s.value}
 
 
-class GatedSineWeights(hm.HybridAutomaton):
-    """The paper's weights ``w = g**2`` with ``g = (square(gate_rate t - phase, duty) + 1) sin(sine_rate t)``.
-
-    Source: paper, section 7; audit, section 9 for the reading ``g**2``.
-    """
+class GateClock(hm.HybridAutomaton):
+    """Gates ``square(gate_rate t - phase, duty)``, one for each edge, each with the index of its present segment."""
 
     degree = hm.Dimension("number of edges")
     segment = hm.DiscreteState(
         0, shape="degree", integer=True, internal=True, computed=True, description="segment of the gate: even is on"
     )
     gate_rate = hm.Parameter(4.0, shape="degree", unit="rad/s", description="rate of the gate")
-    sine_rate = hm.Parameter(5.0, shape="degree", unit="rad/s", description="rate of the sine")
     duty_percent = hm.Parameter(20.0, shape="degree", description="share of each gate period that is on, in percent")
     phase = hm.Parameter(0.0, shape="degree", unit="rad", description="phase of the gate")
     weights = hm.Output(shape="degree", unit="1/s", description="weights of the edges")
-    weight_map = WeightMap.SQUARE
 
     def start_map(self, s: hm.Values) -> dict[str, Value]:
         """The segment that holds the start time."""
         return {"segment": gate_segment(s.t, s.gate_rate, s.phase, s.duty_percent)}
-
-    def outputs(self, s: hm.Values) -> dict[str, Value]:
-        """The weights."""
-        return {"weights": apply_map(gated_sine(s.t, s.segment, s.sine_rate), self.weight_map)}
 
     def ends(self, s: hm.Values) -> Value:
         """End time of each edge's present segment."""
@@ -77,6 +68,20 @@ class GatedSineWeights(hm.HybridAutomaton):
     transitions: ClassVar[tuple[hm.Jump | hm.TimeEvent, ...]] = (
         hm.TimeEvent("gate", next_switch, switch, internal=True),
     )
+
+
+class GatedSineWeights(GateClock):
+    """The paper's weights ``w = g**2`` with ``g = (square(gate_rate t - phase, duty) + 1) sin(sine_rate t)``.
+
+    Source: paper, section 7; audit, section 9 for the reading ``g**2``.
+    """
+
+    sine_rate = hm.Parameter(5.0, shape="degree", unit="rad/s", description="rate of the sine")
+    weight_map = WeightMap.SQUARE
+
+    def outputs(self, s: hm.Values) -> dict[str, Value]:
+        """The weights."""
+        return {"weights": apply_map(gated_sine(s.t, s.segment, s.sine_rate), self.weight_map)}
 
 
 class GatedAbsoluteSineWeights(GatedSineWeights):
@@ -104,6 +109,33 @@ class GatedAbsoluteSineWeights(GatedSineWeights):
         *GatedSineWeights.transitions,
         hm.TimeEvent("zero", next_zero, cross_zero, internal=True),
     )
+
+
+class SquareWeights(GateClock):
+    """Weights that alternate between two levels."""
+
+    high = hm.Parameter(1.0, shape="degree", unit="1/s", description="weight while the gate is on")
+    low = hm.Parameter(0.0, shape="degree", unit="1/s", description="weight while the gate is off")
+
+    def outputs(self, s: hm.Values) -> dict[str, Value]:
+        """The weights."""
+        is_off = s.segment - 2 * np.floor(s.segment / 2)
+        return {"weights": is_off * s.low + (1 - is_off) * s.high}
+
+
+class SineWeights(hm.HybridAutomaton):
+    """Weights ``mean (1 + depth sin(rate t - phase))``, smooth at all times."""
+
+    degree = hm.Dimension("number of edges")
+    mean = hm.Parameter(1.0, shape="degree", unit="1/s", description="mean weight")
+    depth = hm.Parameter(0.5, shape="degree", description="share of the mean by which the weight swings, 0 to 1")
+    rate = hm.Parameter(1.0, shape="degree", unit="rad/s", description="rate of the sine")
+    phase = hm.Parameter(0.0, shape="degree", unit="rad", description="phase of the sine")
+    weights = hm.Output(shape="degree", unit="1/s", description="weights of the edges")
+
+    def outputs(self, s: hm.Values) -> dict[str, Value]:
+        """The weights."""
+        return {"weights": s.mean * (1 + s.depth * np.sin(s.rate * s.t - s.phase))}
 
 
 class PeriodicSwitching(hm.HybridAutomaton):

@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 import hybrid_model as hm
 from hybrid_model.consensus.agents import agent
 from hybrid_model.consensus.channels import LossyChannel, link_seeds
 from hybrid_model.consensus.continuous import ContinuousIntegrator
-from hybrid_model.consensus.edges import (
-    ConstantWeights,
-    GatedAbsoluteSineWeights,
-    GatedSineWeights,
-    PeriodicSwitching,
-)
+from hybrid_model.consensus.edge_blocks import switching_block, weights_block
 from hybrid_model.consensus.integrator import Integrator
 from hybrid_model.consensus.scenario_data import Scenario, TriggerKind
-from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.trigger_blocks import Surroundings, trigger_block
-from hybrid_model.consensus.weights import ConstantWeight, WeightMap
 
 
 def agent_name(number: int) -> str:
@@ -55,7 +46,7 @@ def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
     """
     wires = {}
     for i in range(1, scenario.network.agents + 1):
-        others = [_other_end(scenario, edge, i) for edge in _edges_of(scenario, i)]
+        others = [other_end(scenario, edge, i) for edge in edges_of(scenario, i)]
         wires[f"{agent_name(i)}.neighbours"] = [f"{agent_name(j)}.broadcast" for j in others]
         if others and not scenario.channel.ideal:
             wires[f"{agent_name(i)}.sent"] = [f"{agent_name(j)}.events" for j in others]
@@ -67,25 +58,27 @@ def closed_loop(scenario: Scenario) -> hm.Composition:
     return hm.Composition(scenario.name, scenario_agents(scenario), broadcast_wires(scenario))
 
 
-def _edges_of(scenario: Scenario, number: int) -> list[int]:
+def edges_of(scenario: Scenario, number: int) -> list[int]:
+    """Return the edges of agent `number`, as indices from 0 into the network's list."""
     return [k for k, edge in enumerate(scenario.network.edges) if number in edge]
 
 
-def _other_end(scenario: Scenario, edge: int, number: int) -> int:
+def other_end(scenario: Scenario, edge: int, number: int) -> int:
+    """Return the agent at the other end of an edge of agent `number`."""
     first, second = scenario.network.edges[edge]
     return second if first == number else first
 
 
 def _agent(scenario: Scenario, number: int) -> hm.Composition:
-    edges = _edges_of(scenario, number)
+    edges = edges_of(scenario, number)
     initial = scenario.network.initial[number - 1]
     motion = ContinuousIntegrator if scenario.trigger.kind is TriggerKind.CONTINUOUS else Integrator
     return agent(
         agent_name(number),
         motion(degree=len(edges), x=initial, gain=scenario.network.gain),
-        _weights(scenario, edges),
+        weights_block([scenario.weights.waveforms[k] for k in edges]),
         _trigger(scenario, edges),
-        _switching(scenario, edges),
+        switching_block(scenario.switching, edges),
         _channel(scenario, number, edges),
     )
 
@@ -100,7 +93,7 @@ def _channel(scenario: Scenario, number: int, edges: list[int]) -> hm.HybridAuto
     channel = scenario.channel
     if channel.ideal or not edges:
         return None
-    senders = [_other_end(scenario, edge, number) for edge in edges]
+    senders = [other_end(scenario, edge, number) for edge in edges]
     return LossyChannel(
         degree=len(edges),
         slots=channel.slots,
@@ -108,26 +101,3 @@ def _channel(scenario: Scenario, number: int, edges: list[int]) -> hm.HybridAuto
         loss=channel.loss,
         random=link_seeds(channel.seed, number, senders),
     )
-
-
-def _weights(scenario: Scenario, edges: list[int]) -> hm.Automaton:
-    waveforms = [scenario.weights.waveforms[k] for k in edges]
-    constant = [w for w in waveforms if isinstance(w, ConstantWeight)]
-    if len(constant) == len(waveforms):
-        return ConstantWeights(degree=len(edges), value=np.array([w.level for w in constant]))
-    gated = [w for w in waveforms if not isinstance(w, ConstantWeight)]
-    block = GatedSineWeights if gated[0].map is WeightMap.SQUARE else GatedAbsoluteSineWeights
-    return block(
-        gate_rate=[w.gate_rate for w in gated],
-        sine_rate=[w.sine_rate for w in gated],
-        duty_percent=[w.duty_percent for w in gated],
-        phase=[w.phase for w in gated],
-    )
-
-
-def _switching(scenario: Scenario, edges: list[int]) -> PeriodicSwitching | None:
-    switching = scenario.switching
-    if isinstance(switching, NoSwitching) or not edges:
-        return None
-    active = [[float(k + 1 in row) for k in edges] for row in switching.active]
-    return PeriodicSwitching(dwell=switching.dwell, active=active)

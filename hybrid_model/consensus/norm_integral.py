@@ -6,7 +6,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_model.consensus.carriers import Carrier, SineCarrier
 from hybrid_model.consensus.edge_weights import EdgeWeights, Piece
 
 __all__ = ["NormPrimitive"]
@@ -86,7 +85,7 @@ class NormPrimitive:
         """The piece, cut where quadrature needs it."""
         if piece.is_idle or piece.shared_carrier is not None:
             return [piece]
-        fastest = max(_rate(carrier) for carrier in piece.carriers)
+        fastest = max(carrier.rate for carrier in piece.carriers)
         count = max(1, math.ceil((piece.end - piece.start) * fastest * 4 / math.pi))
         cells = list(pairwise(np.linspace(piece.start, piece.end, count + 1).tolist()))
         wholes = [self._quadrature(piece, *cell) for cell in cells]
@@ -102,7 +101,3 @@ class NormPrimitive:
             else:
                 stack += [((middle, end), right), ((start, middle), left)]
         return finished
-
-
-def _rate(carrier: Carrier) -> float:
-    return carrier.rate if isinstance(carrier, SineCarrier) else 0.0

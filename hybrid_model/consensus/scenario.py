@@ -2,13 +2,15 @@
 
 import os
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 from hybrid_model.consensus.channel_data import IDEAL
+from hybrid_model.consensus.read_switching import read_switching
+from hybrid_model.consensus.read_weights import read_weights
 from hybrid_model.consensus.scenario_data import (
     Channel,
     Network,
@@ -23,7 +25,6 @@ from hybrid_model.consensus.scenario_data import (
 from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching, Switching
 from hybrid_model.consensus.tables import ScenarioError, Table, suggestion
 from hybrid_model.consensus.trigger_data import trigger_keys
-from hybrid_model.consensus.weights import ConstantWeight, GatedSine, Waveform, WeightMap
 
 __all__ = [
     "Channel",
@@ -83,8 +84,15 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     )
 
 
-def read_scenario(entries: Mapping[str, Any]) -> Scenario:
+def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Scenario:
     """Build a scenario from the parsed entries of a scenario file.
+
+    Parameters
+    ----------
+    entries : Mapping
+        The parsed entries.
+    folder : str or path
+        Where the names of files in them count from; `load_scenario` gives the folder of the scenario file.
 
     Raises
     ------
@@ -98,8 +106,8 @@ def read_scenario(entries: Mapping[str, Any]) -> Scenario:
         name=top.text("name"),
         stop_time=top.number("stop_time"),
         network=network,
-        weights=_read_weights(top, edge_count),
-        switching=_read_switching(top, edge_count),
+        weights=read_weights(lambda known: _subtable(top, "weights", known), edge_count, Path(folder)),
+        switching=_read_switching(top, network, top.number("stop_time")),
         trigger=_read_trigger(top),
         channel=_read_channel(top),
     )
@@ -110,10 +118,10 @@ def _load_file(path: Path) -> Scenario:
         content = path.read_bytes()
     except OSError as error:
         raise ScenarioError(f"the scenario file {path} cannot be read: {error.strerror}.") from error
-    return _parse(f"the scenario file {path}", content)
+    return _parse(f"the scenario file {path}", content, path.parent)
 
 
-def _parse(source: str, content: bytes) -> Scenario:
+def _parse(source: str, content: bytes, folder: Path = Path()) -> Scenario:
     try:
         entries = tomllib.loads(content.decode("utf-8"))
     except UnicodeDecodeError as error:
@@ -121,7 +129,7 @@ def _parse(source: str, content: bytes) -> Scenario:
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{source} is not valid TOML: {error}.") from error
     try:
-        return read_scenario(entries)
+        return read_scenario(entries, folder)
     except ScenarioError as error:
         raise ScenarioError(f"{source}: {error}") from error
 
@@ -147,42 +155,10 @@ def _read_network(table: Table) -> Network:
     )
 
 
-def _read_weights(top: Table, edge_count: int) -> Weights:
-    keys = {
-        WeightKind.CONSTANT: ("kind", "value"),
-        WeightKind.GATED_SINE: ("kind", "map", "gate_rate", "sine_rate", "duty_percent", "phase"),
-    }
-    # The kind decides which keys are known, so it is read from a table that accepts them all.
-    any_kind = _subtable(top, "weights", tuple(dict.fromkeys(key for names in keys.values() for key in names)))
-    kind = any_kind.choice("kind", WeightKind)
-    table = _subtable(top, "weights", keys[kind])
-    if kind is WeightKind.CONSTANT:
-        return Weights(_each_edge(ConstantWeight, zip(table.per_edge("value", edge_count), strict=True)))
-    weight_map = table.choice("map", WeightMap, default=WeightMap.SQUARE)
-    columns = [table.per_edge(key, edge_count) for key in ("gate_rate", "sine_rate", "duty_percent")]
-    phases = table.per_edge("phase", edge_count, default=0.0)
-    return Weights(_each_edge(GatedSine, zip(*columns, phases, (weight_map,) * edge_count, strict=True)))
-
-
-def _each_edge(waveform: Callable[..., Waveform], rows: "zip[Any]") -> tuple[Waveform, ...]:
-    waveforms = []
-    for number, row in enumerate(rows, start=1):
-        try:
-            waveforms.append(waveform(*row))
-        except ValueError as error:
-            raise ScenarioError(f"[weights] of edge {number}: {error}") from error
-    return tuple(waveforms)
-
-
-def _read_switching(top: Table, edge_count: int) -> Switching:
+def _read_switching(top: Table, network: Network, stop_time: float) -> Switching:
     if "switching" not in top:
-        return NoSwitching(edge_count)
-    table = _subtable(top, "switching", ("dwell", "active"))
-    dwell, active = table.number("dwell"), table.whole_number_lists("active")
-    try:
-        return PeriodicSwitching(dwell, active, edge_count)
-    except ValueError as error:
-        raise ScenarioError(f"[switching] {error}") from error
+        return NoSwitching(len(network.edges))
+    return read_switching(lambda known: _subtable(top, "switching", known), network, stop_time)
 
 
 def _read_trigger(top: Table) -> Trigger:

@@ -9,9 +9,12 @@ from hybrid_model.consensus.channel_data import IDEAL, Channel
 from hybrid_model.consensus.edge_weights import EdgeWeights
 from hybrid_model.consensus.graphs import Edge, complete_edges, validate_edges
 from hybrid_model.consensus.switching import Switching
+from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
 from hybrid_model.consensus.tables import ScenarioError
 from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
-from hybrid_model.consensus.weights import ConstantWeight, Waveform
+from hybrid_model.consensus.wave_weights import SineWeight, SquareWeight
+from hybrid_model.consensus.waveform import Waveform
+from hybrid_model.consensus.weights import ConstantWeight, GatedSine
 
 __all__ = [
     "Channel",
@@ -34,10 +37,25 @@ class Underlying(enum.Enum):
 
 
 class WeightKind(enum.Enum):
-    """The families of waveforms that a scenario file can name."""
+    """The families of waveforms; a scenario file can name all of them but FUNCTION, which is given in Python."""
 
     GATED_SINE = "gated-sine"
     CONSTANT = "constant"
+    SINE = "sine"
+    SQUARE = "square"
+    PIECEWISE = "piecewise"
+    SAMPLED = "sampled"
+    FUNCTION = "function"
+
+
+_KINDS: dict[type, WeightKind] = {
+    GatedSine: WeightKind.GATED_SINE,
+    ConstantWeight: WeightKind.CONSTANT,
+    SineWeight: WeightKind.SINE,
+    SquareWeight: WeightKind.SQUARE,
+    PiecewiseWeight: WeightKind.PIECEWISE,
+    SampledWeight: WeightKind.SAMPLED,
+}
 
 
 @dataclass(frozen=True)
@@ -111,7 +129,7 @@ class Weights:
     @property
     def kind(self) -> WeightKind:
         """The family of the waveforms."""
-        return WeightKind.CONSTANT if isinstance(self.waveforms[0], ConstantWeight) else WeightKind.GATED_SINE
+        return _KINDS.get(type(self.waveforms[0]), WeightKind.FUNCTION)
 
 
 @dataclass(frozen=True)
@@ -164,6 +182,14 @@ class Scenario:
             if count != edge_count:
                 raise ScenarioError(
                     f"{table} is made for {count} edges, but [network] lists {edge_count}; they must be the same edges."
+                )
+        domains = [("[switching]", self.switching.domain)]
+        domains += [(f"[weights] of edge {k}", wave.domain) for k, wave in enumerate(self.weights.waveforms, start=1)]
+        for table, (first, last) in domains:
+            if first > 0 or last < self.stop_time:
+                raise ScenarioError(
+                    f"{table} is given from {first:.6g} s to {last:.6g} s, but the run goes from 0 s to "
+                    f"{self.stop_time:.6g} s; let it cover the run or repeat."
                 )
 
     @cached_property

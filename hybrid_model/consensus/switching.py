@@ -1,14 +1,42 @@
-"""Switching of the active edges: cyclic with a fixed dwell time, or none."""
+"""Switching of the active edges: cyclic with a fixed dwell time, or none; the interface of all kinds."""
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid_model.consensus.gating import dwell_boundary, dwell_index
+from hybrid_model.consensus.switching_sequence import SwitchingSequence, validate_active
+from hybrid_model.consensus.waveform import ALWAYS
 
-__all__ = ["NoSwitching", "PeriodicSwitching", "Switching", "dwell_boundary", "dwell_index"]
+__all__ = ["NoSwitching", "PeriodicSwitching", "Switching", "SwitchingSequence", "dwell_boundary", "dwell_index"]
+
+
+class Switching(Protocol):
+    """Which edges may carry weight when."""
+
+    @property
+    def edge_count(self) -> int:
+        """Number of edges of the network."""
+
+    @property
+    def period(self) -> float | None:
+        """A period [s]; 0.0 if nothing ever changes, None if there is none."""
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """First and last time [s] that the switching is given for."""
+
+    def phase(self, t: float) -> int:
+        """Index, from 0, of the graph that is active at `t` [s]."""
+
+    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
+        """Switching instants strictly between `t0` and `t1` [s], ascending."""
+
+    def active_at(self, t: float) -> NDArray[np.bool_]:
+        """Mask, shape (edge_count,), of the edges that are active at `t` [s]."""
 
 
 @dataclass(frozen=True)
@@ -42,22 +70,18 @@ class PeriodicSwitching:
         """Check the values."""
         if not (math.isfinite(self.dwell) and self.dwell > 0):
             raise ValueError(f"dwell is {self.dwell}; it must be a positive, finite number of seconds.")
-        if not self.active:
-            raise ValueError("active is empty; it must list the active edges of at least one phase.")
-        for number, edges in enumerate(self.active, start=1):
-            for edge in edges:
-                if not 1 <= edge <= self.edge_count:
-                    raise ValueError(
-                        f"active phase {number} names edge {edge}; edges are numbered from 1 to {self.edge_count}."
-                    )
-            if len(set(edges)) < len(edges):
-                raise ValueError(f"active phase {number} is {list(edges)}; each edge may be listed only once.")
+        validate_active(self.active, self.edge_count)
 
     @property
     def period(self) -> float:
         """Length of the whole cycle [s]; 0.0 if all phases have the same active edges."""
         is_constant = all(set(edges) == set(self.active[0]) for edges in self.active)
         return 0.0 if is_constant else self.dwell * len(self.active)
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """All times."""
+        return ALWAYS
 
     def phase(self, t: float) -> int:
         """Index, from 0, of the phase that holds time `t` [s]; at a switching instant, of the phase that begins."""
@@ -88,6 +112,11 @@ class NoSwitching:
         """0.0: nothing changes."""
         return 0.0
 
+    @property
+    def domain(self) -> tuple[float, float]:
+        """All times."""
+        return ALWAYS
+
     def phase(self, t: float) -> int:
         """0, the only phase."""
         return 0
@@ -99,6 +128,3 @@ class NoSwitching:
     def active_at(self, t: float) -> NDArray[np.bool_]:
         """Mask of shape (edge_count,), all true."""
         return np.ones(self.edge_count, dtype=bool)
-
-
-Switching = PeriodicSwitching | NoSwitching

@@ -107,15 +107,47 @@ class Table:
             rows.append(tuple(self._as_whole_number(f"{name}[{k}]", value) for k, value in enumerate(row, start=1)))
         return tuple(rows)
 
+    def flag(self, key: str, default: bool) -> bool:
+        """True or false."""
+        if key not in self:
+            return default
+        value = self._entries[key]
+        if not isinstance(value, bool):
+            raise self.error(key, value, "must be true or false")
+        return value
+
+    def rows(self, key: str, count: int, of_what: str = "edges", shared: bool = True) -> tuple[tuple[float, ...], ...]:
+        """A list of numbers for each of `count` things; if it may be `shared`, a single list stands for all."""
+        listed = self._listed(key, "lists of numbers")
+        rows = [row for _, row in listed]
+        if shared and rows and not isinstance(rows[0], list):
+            return (self.numbers(key),) * count
+        for place, row in enumerate(rows, start=1):
+            if not isinstance(row, list):
+                raise self.error(f"{key}[{place}]", row, "must be a list of numbers")
+        if len(rows) != count:
+            also = ", or a single list for all" if shared else ""
+            raise ScenarioError(
+                f"{self.name} {key} lists {len(rows)} lists for {count} {of_what}; give one list for each{also}."
+            )
+        return tuple(
+            tuple(self._as_number(f"{key}[{place}][{k}]", value) for k, value in enumerate(row, start=1))
+            for place, row in enumerate(rows, start=1)
+        )
+
     def per_edge(self, key: str, edge_count: int, default: float | None = None) -> tuple[float, ...]:
         """A number for each edge: a list of `edge_count` numbers, or one number that stands for all edges."""
+        return self.per_item(key, edge_count, "edge", default)
+
+    def per_item(self, key: str, count: int, of_what: str, default: float | None = None) -> tuple[float, ...]:
+        """A number for each of `count` things, or one number that stands for all."""
         if not isinstance(self._entries.get(key), list):
-            return (self.number(key, default),) * edge_count
+            return (self.number(key, default),) * count
         values = self.numbers(key)
-        if len(values) != edge_count:
+        if len(values) != count:
             raise ScenarioError(
-                f"{self.name} {key} lists {len(values)} numbers for {edge_count} edges; "
-                "give one number for each edge, or a single number for all."
+                f"{self.name} {key} lists {len(values)} numbers for {count} {of_what}s; "
+                f"give one number for each {of_what}, or a single number for all."
             )
         return values
 

@@ -7,14 +7,16 @@ consensus dynamics is a matrix exponential of a closed-form integral.
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.carriers import Carrier, SineCarrier, UnitCarrier, WeightMap, apply_map
+from hybrid_model.consensus.gate import Gate
 from hybrid_model.consensus.gating import gate_boundary, gate_segment, gated_sine, half_wave, half_wave_boundary
 from hybrid_model.consensus.periods import common_period
+from hybrid_model.consensus.waveform import ALWAYS, Waveform, require
 
 __all__ = [
     "Carrier",
@@ -52,7 +54,7 @@ class ConstantWeight:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        _require("the constant weight", self.level, self.level >= 0, "must not be negative")
+        require("the constant weight", self.level, self.level >= 0, "must not be negative")
 
     @property
     def carrier(self) -> UnitCarrier:
@@ -63,6 +65,11 @@ class ConstantWeight:
     def period(self) -> float:
         """0.0: every number is a period of a constant."""
         return 0.0
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        """All times."""
+        return ALWAYS
 
     def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
         """The level, in the shape of `t` [s]."""
@@ -114,10 +121,13 @@ class GatedSine:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        _require("gate_rate", self.gate_rate, self.gate_rate > 0, "must be positive")
-        _require("sine_rate", self.sine_rate, self.sine_rate > 0, "must be positive")
-        _require("duty_percent", self.duty_percent, 0 <= self.duty_percent <= 100, "must lie between 0 and 100")
-        _require("phase", self.phase, True, "must be finite")
+        require("sine_rate", self.sine_rate, self.sine_rate > 0, "must be positive")
+        self.gate.check()
+
+    @cached_property
+    def gate(self) -> Gate:
+        """When the weight is on."""
+        return Gate(self.gate_rate, self.duty_percent, self.phase)
 
     @property
     def carrier(self) -> SineCarrier:
@@ -137,66 +147,34 @@ class GatedSine:
             return carrier_period
         return common_period((2 * math.pi / self.gate_rate, carrier_period))
 
+    @property
+    def domain(self) -> tuple[float, float]:
+        """All times."""
+        return ALWAYS
+
     def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
         """1 where the gate is open at `t` [s], else 0."""
-        segment = self._segment(np.asarray(t, dtype=float))
-        return np.asarray(1.0 - segment % 2)
+        return self.gate.is_open(t)
 
     def value(self, t: ArrayLike) -> NDArray[np.float64]:
         """The weight at `t` [s], in the shape of `t`."""
         time = np.asarray(t, dtype=float)
-        return np.asarray(apply_map(gated_sine(time, self._segment(time), self.sine_rate), self.map))
+        return np.asarray(apply_map(gated_sine(time, self.gate.segment(time), self.sine_rate), self.map))
 
     def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
         """Times strictly between `t0` and `t1` [s], ascending, at which the weight jumps or has a kink.
 
         These are the gate's boundaries and, for ABS, the zeros of the sine inside open windows.
         """
-        times = np.empty(0)
-        if 0 < self.duty_percent < 100:
-            times = self._boundary(np.arange(self._segment(t0), self._segment(t1)))
-        if self.map is WeightMap.ABS:
-            zeros = half_wave_boundary(
-                np.arange(half_wave(t0, self.sine_rate), half_wave(t1, self.sine_rate)), self.sine_rate
-            )
-            times = np.union1d(times, zeros[self.amplitude(zeros) > 0])
+        times = self.gate.breakpoints(t0, t1)
+        if self.map is WeightMap.SQUARE:
+            return times
+        zeros = half_wave_boundary(
+            np.arange(half_wave(t0, self.sine_rate), half_wave(t1, self.sine_rate)), self.sine_rate
+        )
+        times = np.union1d(times, zeros[self.amplitude(zeros) > 0])
         return times[(times > t0) & (times < t1)]
 
     def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
         """Exact integral of the weight from `t0` to `t1` [s]; the two broadcast against each other."""
-        begin, end = np.broadcast_arrays(np.asarray(t0, dtype=float), np.asarray(t1, dtype=float))
-        if begin.size == 0:
-            return np.zeros(begin.shape)
-        first, last = float(min(begin.min(), end.min())), float(max(begin.max(), end.max()))
-        windows = np.arange(self._window(first), self._window(last) + 1)
-        # Cutting the first window at the earliest time makes its primitive zero there: a scalar integral is then one
-        # sum of positive terms, with no difference of two large numbers.
-        opens = np.maximum(self._boundary(2 * windows - 1), first)
-        closes = np.maximum(self._boundary(2 * windows), opens)
-        before = np.concatenate(([0.0], np.cumsum(self.carrier.integral(opens, closes))))
-
-        def primitive(t: NDArray[np.float64]) -> NDArray[np.float64]:
-            index = (self._window(t) - windows[0]).astype(int)
-            within = np.clip(t, opens[index], closes[index])
-            return np.asarray(before[index] + self.carrier.integral(opens[index], within))
-
-        return primitive(end) - primitive(begin)
-
-    def _segment(self, t: Any) -> Any:
-        return gate_segment(t, self.gate_rate, self.phase, self.duty_percent)
-
-    def _window(self, t: Any) -> Any:
-        return np.floor(self._segment(t) / 2)
-
-    def _boundary(self, k: Any) -> Any:
-        return gate_boundary(k, self.gate_rate, self.phase, self.duty_percent)
-
-
-Waveform = ConstantWeight | GatedSine
-
-
-def _require(name: str, value: float, is_valid: bool, rule: str) -> None:
-    if not math.isfinite(value):
-        raise ValueError(f"{name} is {value}; it must be a finite number.")
-    if not is_valid:
-        raise ValueError(f"{name} is {value}; it {rule}.")
+        return self.gate.integral(self.carrier, t0, t1)
