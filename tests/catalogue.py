@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import control
 import numpy as np
+from catalogue_triggers import trigger_cases
 
 import hybrid_model as hm
 import hybrid_model.models
@@ -51,6 +52,7 @@ def cases():
     found |= process_cases()
     found |= mechanics_cases()
     found |= linear_cases()
+    found |= trigger_cases(Case)
     for kind in ("static", "dynamic"):
         scenario = replace_trigger(paper, kind)
         found[f"paper_{kind}"] = Case(closed_loop(scenario), 20.0)

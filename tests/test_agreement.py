@@ -4,6 +4,10 @@ The Python run integrates with DOP853 over SciPy, the FMU with its own Dormand-P
 predicts event by event: what they share is the automaton and nothing of the numerics.
 """
 
+import importlib
+import inspect
+import pkgutil
+
 import numpy as np
 import pytest
 from catalogue import cases
@@ -14,7 +18,7 @@ from cosim.automaton_slave import AutomatonSlave
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
-from hybrid_model.consensus import agents, edges
+from hybrid_model import consensus
 from hybrid_model.variables import Kind, element_names
 
 # The issue's limits: times of events, and states.
@@ -65,7 +69,7 @@ def step_values(case, variable, t):
     values = []
     for name in element_names(variable):
         values.append([start[name], *(value for time, value in case.steps.get(name, ()) if time <= t)][-1])
-    return np.array(values) if variable.shape else values[0]
+    return np.reshape(values, variable.shape)
 
 
 def cosimulate(case, slave):
@@ -131,7 +135,8 @@ def test_catalogue_is_complete():
     for case in cases().values():
         collect(case.automaton)
     models = {getattr(hm.models, name) for name in hm.models.__all__}
-    for module in (agents, edges):
-        own = [item for item in vars(module).values() if getattr(item, "__module__", "") == module.__name__]
-        models |= {item for item in own if isinstance(item, type) and issubclass(item, hm.HybridAutomaton)}
-    assert models - parts == {agents.EventGenerator}  # the base class of the triggers, abstract
+    for found in pkgutil.iter_modules(consensus.__path__, "hybrid_model.consensus."):
+        own = [item for item in vars(importlib.import_module(found.name)).values() if isinstance(item, type)]
+        models |= {item for item in own if issubclass(item, hm.HybridAutomaton) and item.__module__ == found.name}
+    bases = {base for part in parts for base in part.__mro__[1:]}
+    assert {model for model in models - parts - bases if not inspect.isabstract(model)} == set()

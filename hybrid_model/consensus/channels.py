@@ -40,10 +40,14 @@ class LossyChannel(hm.HybridAutomaton):
     slots = hm.Dimension("broadcasts that may be under way on a link at once")
     neighbours = hm.Input(0.0, shape="degree", discrete=True, description="broadcast values of the neighbours")
     sent = hm.Input(0.0, shape="degree", discrete=True, description="numbers of broadcasts of the neighbours")
-    received = hm.DiscreteState(shape="degree", computed=True, output=True, description="value that arrived last")
+    received = hm.DiscreteState(0.0, shape="degree", output=True, description="value that arrived last")
     lost = hm.DiscreteState(0, shape="degree", integer=True, output=True, description="broadcasts lost on each link")
     seen = hm.DiscreteState(
-        0, shape="degree", integer=True, internal=True, computed=True, description="broadcasts taken note of"
+        -1,
+        shape="degree",
+        integer=True,
+        internal=True,
+        description="broadcasts taken note of; -1 before the start",
     )
     accepted = hm.DiscreteState(0, shape="degree", integer=True, internal=True, description="broadcasts put under way")
     arrived = hm.DiscreteState(0, shape="degree", integer=True, internal=True, description="broadcasts that arrived")
@@ -58,10 +62,6 @@ class LossyChannel(hm.HybridAutomaton):
     loss = hm.Parameter(0.0, description="probability that a broadcast is lost")
     arrival_clock = hm.Clock("arrival", description="ticks when broadcasts arrive")
 
-    def start_map(self, s: hm.Values) -> dict[str, Value]:
-        """The broadcasts at the start are known."""
-        return {"received": s.neighbours, "seen": s.sent}
-
     def flow_set(self, s: hm.Values) -> Value:
         """No more broadcasts under way than there are places."""
         return s.values.shape[1] + 0.5 - np.max(s.accepted - s.arrived)
@@ -71,14 +71,19 @@ class LossyChannel(hm.HybridAutomaton):
         return np.max(s.sent - s.seen) - 0.5
 
     def take_note(self, s: hm.Values) -> dict[str, Value]:
-        """Draw for each new broadcast; put those that are not lost under way."""
-        new = s.sent > s.seen + 0.5
+        """Draw for each new broadcast, and put those that are not lost under way; at the start take the values over.
+
+        The first look is a jump, not a start value, because at the start the senders' values are still being computed.
+        """
+        is_start = s.seen < -0.5
+        new = np.where(is_start, 0.0, np.where(s.sent > s.seen + 0.5, 1.0, 0.0)) > 0.5
         product = MULTIPLIER * s.random
         drawn = product - MODULUS * np.floor(product / MODULUS)
         is_lost = np.where(new, np.where(drawn < s.loss * MODULUS, 1.0, 0.0), 0.0)
         kept = np.where(new, 1.0 - is_lost, 0.0)
         chosen = kept[:, None] * self._place(s, s.accepted) > 0.5
         return {
+            "received": np.where(is_start, s.neighbours, s.received),
             "seen": s.sent,
             "random": np.where(new, drawn, s.random),
             "lost": s.lost + is_lost,
