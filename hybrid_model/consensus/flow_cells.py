@@ -37,7 +37,7 @@ class FlowCells:
     @property
     def is_idle(self) -> NDArray[np.bool_]:
         """Mask, shape (cells,), of the cells in which no edge carries weight."""
-        return ~self.doses.any(axis=1)
+        return np.asarray(~self.doses.any(axis=1))
 
     def product(self) -> NDArray[np.float64]:
         """The transition matrix over the whole interval."""

@@ -1,38 +1,23 @@
-"""The exact worst case: how large disagreement can get under all errors that the trigger admits.
+"""The exact worst case: how large disagreement can get under all errors that the trigger admits (audit, section 7)."""
 
-Every measurable error with ``|e_i(t)| <= c exp(-beta t)`` is allowed, started in the infinite past, and the weights are
-periodic. With ``phi`` the transition matrix of ``xi' = -k N xi`` the part of ``xi(t)`` that the errors cause is
-
-    -int phi(t, s) k N(s) U^T e(s) ds = -int d_s phi(t, s) U^T e(s),      as  d_s phi(t, s) = phi(t, s) k N(s).
-
-Its largest value along b is therefore c times the total variation over s of the entries of ``U phi(t, s)^T b``,
-weighted with ``exp(beta (t - s))``: the support function of audit, section 7, without an integral over weights.
-"""
+from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_model.consensus.flow_cells import FlowCells, flow_cells
-from hybrid_model.consensus.graphs import disagreement_basis, incidence
+from hybrid_model.consensus.graphs import disagreement_basis
+from hybrid_model.consensus.reachable_sets import ReachableSets
 from hybrid_model.consensus.scenario_data import Scenario
 
-__all__ = ["ReachableSets", "WorstCase", "starting_directions", "worst_case"]
+__all__ = ["WorstCase", "starting_directions", "worst_case"]
 
 _STARTS = 48
 _FEW = 8
-_INSIDE = 6
 _COARSE = 0.05
-_ITERATIONS = 200
-_STALLED = 1e-10
-_TAIL = 1e-11
-_MOST_CYCLES = 20_000
-_CHUNK = 4_000_000
-"""Numbers in the largest temporary array."""
+_MOST_STEPS = 200
 
 
 @dataclass(frozen=True)
@@ -54,151 +39,16 @@ class WorstCase:
     time: float
 
 
-class ReachableSets:
-    """The sets of ``xi(t)`` that errors within the box ``|e_i| <= exp(-beta t)`` reach, times ``exp(beta t)``.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Network with periodic or constant weights.
-    period : float
-        A period [s] of the weights; any positive number for constant weights.
-    decay : float
-        beta [1/s], below the Floquet rate.
-    resolution : float
-        Largest ``k int ||N||`` over a cell of the grid. The suprema are reached from below with an error of the second
-        order: about a share of 1e-6 at 0.01.
-    """
-
-    def __init__(self, scenario: Scenario, period: float, decay: float, resolution: float) -> None:
-        """Cut one period into cells."""
-        longest = resolution / decay if decay > 0 else np.inf
-        self._cells: FlowCells = flow_cells(scenario, 0.0, period, resolution, longest)
-        self._period, self._decay = period, decay
-        network = scenario.network
-        self._basis = disagreement_basis(network.agents)
-        self._edge_form = self._basis.T @ incidence(network.agents, network.underlying_edges)
-
-    @property
-    def times(self) -> NDArray[np.float64]:
-        """Ends of the cells [s] in one period, where the sets can be asked for by index."""
-        return self._cells.times[:-1]
-
-    @property
-    def is_idle(self) -> NDArray[np.bool_]:
-        """Mask of the cells in which no edge carries weight; cell j begins at ``times[j]``."""
-        return self._cells.is_idle
-
-    @cached_property
-    def edge_gain(self) -> float:
-        """Square root of the largest eigenvalue of ``D D^T``: ``||x_e|| <= edge_gain*||xi||``."""
-        return float(np.linalg.norm(self._edge_form, 2))
-
-    def at(self, index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Generators of one period and the monodromy matrix, for the time ``times[index]``.
-
-        Returns
-        -------
-        generators : ndarray, shape (cells*n, p)
-            ``(phi(t, s_{j+1}) - phi(t, s_j)) U^T e_i exp(beta (t - s))`` over the last period, cells without weight
-            left out.
-        monodromy : ndarray, shape (p, p)
-            ``phi(t, t - P) exp(beta P)``.
-        """
-        count, size = len(self._cells.flows), self._basis.shape[1]
-        flow, steps, ages = np.eye(size), [], []
-        age, lengths, idle = 0.0, np.diff(self._cells.times), self._cells.is_idle
-        for j in range(index - 1, index - 1 - count, -1):
-            # Indices below zero mean the period before, which looks the same.
-            earlier = flow @ self._cells.flows[j]
-            if not idle[j]:
-                steps.append(flow - earlier)
-                ages.append(age + lengths[j] / 2)
-            flow, age = earlier, age + lengths[j]
-        scale = np.exp(self._decay * np.array(ages))
-        moved = np.stack(steps) @ self._basis.T * scale[:, None, None]
-        generators = np.swapaxes(moved, 1, 2).reshape(-1, size)
-        return generators, flow * np.exp(self._decay * self._period)
-
-    def support(self, index: int, directions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Support function and support points at ``times[index]`` for directions of shape (p, count).
-
-        Returns
-        -------
-        values : ndarray, shape (count,)
-        points : ndarray, shape (p, count)
-        """
-        generators, monodromy = self.at(index)
-        return _support(generators, monodromy, directions)
-
-    def radius(self, index: int, starts: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
-        """Largest ``||x_e||`` over the set at ``times[index]``, and its direction, shape (p, 1).
-
-        The norm is convex, so its maximum lies at an extreme point: the support point of its own gradient. Power
-        iteration from each of the `starts`, shape (p, count), never decreases.
-        """
-        generators, monodromy = self.at(index)
-        form = self._edge_form @ self._edge_form.T
-        directions, best, where = starts, 0.0, starts[:, :1]
-        for _ in range(_ITERATIONS):
-            _, points = _support(generators, monodromy, directions)
-            squares = np.einsum("ic,ij,jc->c", points, form, points)
-            ranked = np.argsort(-squares)
-            largest = float(np.sqrt(squares[ranked[0]]))
-            if largest <= best * (1 + _STALLED):
-                break
-            # The worse half of the starts is given up in each step.
-            best, directions = largest, form @ points[:, ranked[: max(2, len(ranked) // 2)]]
-            where = directions[:, :1]
-        return best, where
-
-    def candidates(self, scenario: Scenario) -> NDArray[np.intp]:
-        """Indices of times at which suprema are looked for: ends of the pieces, and points inside active ones."""
-        if scenario.edge_weights.period == 0.0:
-            return np.zeros(1, dtype=np.intp)
-        cuts = np.append(scenario.edge_weights.breakpoints(0.0, self._period), self._period)
-        ends = np.concatenate(([0], np.searchsorted(self._cells.times, cuts * (1 - 1e-12))))
-        inner = [np.linspace(a, b, _INSIDE, endpoint=False).astype(np.intp) for a, b in pairwise(ends)]
-        return np.unique(np.concatenate(inner))
-
-    def contraction(self) -> float:
-        """Largest ``||phi(t + P, t)||`` over the grid of times."""
-        count, size = len(self._cells.flows), self._basis.shape[1]
-        flow, places = np.broadcast_to(np.eye(size), (count, size, size)), np.arange(count)
-        for j in range(count):
-            flow = self._cells.flows[(places + j) % count] @ flow
-        return float(np.max(np.linalg.norm(flow, 2, axis=(1, 2))))
-
-
-def _support(
-    generators: NDArray[np.float64], monodromy: NDArray[np.float64], directions: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Sum over all earlier periods: the m-th one sees the direction ``(monodromy^T)^m b``."""
-    history = [directions / np.linalg.norm(directions, axis=0)]
-    while np.linalg.norm(history[-1]) > _TAIL * np.linalg.norm(history[0]):
-        if len(history) > _MOST_CYCLES:
-            raise ValueError(
-                f"disagreement forgets less than {_TAIL:g} of itself in {_MOST_CYCLES} periods; "
-                "choose beta further below the Floquet rate."
-            )
-        history.append(monodromy.T @ history[-1])
-    count = directions.shape[1]
-    values, partial = np.zeros(count), []
-    block = max(1, _CHUNK // (len(generators) * count))
-    for first in range(0, len(history), block):
-        chunk = np.concatenate(history[first : first + block], axis=1)
-        along = generators @ chunk
-        values += np.abs(along).sum(axis=0).reshape(-1, count).sum(axis=0)
-        points = generators.T @ np.sign(along)
-        partial += [points[:, k : k + count] for k in range(0, points.shape[1], count)]
-    total = np.zeros_like(directions)
-    for points in reversed(partial):
-        total = points + monodromy @ total
-    return values * np.linalg.norm(directions, axis=0), total
-
-
-def worst_case(scenario: Scenario, period: float, decay: float, resolution: float = 0.01) -> WorstCase:
-    """Suprema over all admissible errors; parameters as `ReachableSets`, threshold that of the scenario.
+def worst_case(
+    scenario: Scenario,
+    period: float,
+    decay: float,
+    resolution: float = 0.01,
+    *,
+    periodic: bool = True,
+    threshold: float | None = None,
+) -> WorstCase:
+    """Suprema over all admissible errors; parameters as `ReachableSets`, c by default that of the scenario.
 
     Notes
     -----
@@ -206,8 +56,10 @@ def worst_case(scenario: Scenario, period: float, decay: float, resolution: floa
     fine grid. A maximum is reached from below, so a narrower one that the search misses would make the number small.
     """
     network = scenario.network
-    coarse = ReachableSets(scenario, period, decay, max(resolution, _COARSE))
-    fine = coarse if resolution >= _COARSE else ReachableSets(scenario, period, decay, resolution)
+    coarse = ReachableSets(scenario, period, decay, max(resolution, _COARSE), periodic=periodic)
+    fine = coarse
+    if resolution < _COARSE:
+        fine = ReachableSets(scenario, period, decay, resolution, periodic=periodic)
     starts = starting_directions(network.agents)
     indices = coarse.candidates(scenario)
     basis = disagreement_basis(network.agents)
@@ -219,7 +71,7 @@ def worst_case(scenario: Scenario, period: float, decay: float, resolution: floa
     _, direction = coarse.radius(int(indices[best]), starts)
     times = np.append(coarse.times[indices], period)
     radius, time = _refine(fine, times, best, lambda index: fine.radius(index, direction)[0])
-    threshold = scenario.trigger.threshold
+    threshold = scenario.trigger.threshold if threshold is None else threshold
     found = {}
     for column, pair in enumerate(network.edges):
         along = pairs[:, column : column + 1]
@@ -247,7 +99,7 @@ def _refine(
         ordered = sorted(inner | {low, high})
         place = ordered.index(top)
         low, middle, high = ordered[max(place - 1, 0)], top, ordered[min(place + 1, len(ordered) - 1)]
-        if (middle - low <= 1 and high - middle <= 1) or len(known) > 2 * _ITERATIONS:
+        if (middle - low <= 1 and high - middle <= 1) or len(known) > _MOST_STEPS:
             break
     index = max(known, key=lambda at: known[at])
     return known[index], float(sets.times[index % count])

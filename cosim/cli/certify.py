@@ -1,0 +1,78 @@
+"""`hybrid-fmu certify`: printed, valid and exact bounds of a scenario beside what a run shows."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import asdict
+from typing import Any
+
+import hybrid_model as hm
+from cosim.cli.exits import exit_of, progress
+from fmu.compiled import compiled
+from hybrid_model.consensus.certified import Certified
+from hybrid_model.consensus.certify import Certificates, certify
+from hybrid_model.consensus.network import closed_loop
+from hybrid_model.consensus.scenario import load_scenario
+
+_TITLES = {
+    "rate": "rate of convergence",
+    "transient": "factor of the rate",
+    "radius": "ultimate radius of ||x_e||",
+    "min_gap": "minimum time between broadcasts",
+}
+
+
+def add_parser(commands: Any) -> None:
+    """Add the command to the command line."""
+    parser = commands.add_parser("certify", help="bounds of a scenario beside what a run shows", allow_abbrev=False)
+    parser.add_argument("scenario", metavar="SCENARIO", help="name of a preset, or path of a TOML file")
+    parser.add_argument("--json", action="store_true", help="print the certificates as a JSON object")
+    parser.add_argument(
+        "--details",
+        action="store_true",
+        help="with --json: add unit, source and hypotheses of each value, and all hypotheses checked",
+    )
+    parser.set_defaults(run=run)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run the command."""
+    scenario = load_scenario(options.scenario)
+    progress("running the closed loop")
+    arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+    progress("computing the bounds")
+    found = certify(scenario, arc)
+    print(json.dumps(_document(found, details=options.details), indent=2) if options.json else _text(found))
+    return exit_of(arc.stop.name)
+
+
+def _document(found: Certificates, *, details: bool) -> dict[str, Any]:
+    document = found.as_dict()
+    if details:
+        document["details"] = [asdict(value) for value in found.values]
+        document["hypotheses"] = [asdict(hypothesis) for hypothesis in found.hypotheses]
+    return document
+
+
+def _text(found: Certificates) -> str:
+    lines = [f"{found.scenario.name}: certificates"]
+    for quantity, title in _TITLES.items():
+        rows = [value for value in found.values if value.quantity == quantity]
+        lines += ["", f"{title} [{rows[0].unit}]"]
+        lines += [_row(value, found) for value in rows]
+    mu1, mu2, window = (found.excitation[key] for key in ("mu1", "mu2", "T"))
+    lines += ["", f"excitation of the tree's weights: mu1 {_number(mu1)}, mu2 {_number(mu2)}, T {_number(window)} s"]
+    lines += ["", "hypotheses"]
+    lines += [f"  {'holds' if h.holds else 'FAILS':<6} {h.name}: {h.detail} ({h.source})" for h in found.hypotheses]
+    return "\n".join([*lines, "", "notes", *(f"  - {note}" for note in found.notes)])
+
+
+def _row(value: Certified, found: Certificates) -> str:
+    failed = [h.name for h in found.hypotheses if h.name in value.needs and not h.holds]
+    why = f"  fails: {', '.join(failed)}" if value.value is None and failed else ""
+    return f"  {value.form:<9} {_number(value.value):>14}  {value.source}{why}".rstrip()
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.7g}"

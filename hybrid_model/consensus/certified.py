@@ -1,0 +1,114 @@
+"""The bounds of a scenario as a table: quantity, form, value, unit, source, hypotheses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hybrid_model.consensus.bounds import Bounds
+from hybrid_model.consensus.hypotheses import PAPER_LAWS
+from hybrid_model.consensus.observed import Observation
+
+__all__ = ["Certified", "certified_values"]
+
+
+@dataclass(frozen=True)
+class Certified:
+    """One bound in one form.
+
+    Parameters
+    ----------
+    quantity : str
+        "rate", "transient", "radius" or "min_gap".
+    form : str
+        "printed", "valid", "improved", "energy", "exact", "floquet" or "observed".
+    value : float or None
+        None if a hypothesis fails.
+    unit : str
+        Of the value.
+    source : str
+        Where the formula is.
+    needs : tuple of str
+        Names of the hypotheses.
+    """
+
+    quantity: str
+    form: str
+    value: float | None
+    unit: str
+    source: str
+    needs: tuple[str, ...]
+
+
+def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certified, ...]:
+    """All bounds in all forms; the observed ones are None without a run."""
+    decay = bounds.slowest[0][1] if bounds.slowest else 0.0
+    ball = "unit of x" if decay == 0 else f"unit of x, times exp(-{decay:.6g} t)"
+    union, tree, errors = "connected union", "exciting tree", "bounded errors"
+    paper, periodic = "trigger of the paper", "periodic weights"
+
+    def entries(quantity: str, unit: str, *rows: tuple[str, float | None, str, tuple[str, ...]]) -> list[Certified]:
+        return [Certified(quantity, form, value, unit, source, needs) for form, value, source, needs in rows]
+
+    analysis = bounds.analysis
+    improved = bounds.improved_rate
+    rates = entries(
+        "rate",
+        "1/s",
+        ("printed", bounds.printed.rate or None, "paper, theorem 1 (false as printed: audit, section 3)", (tree,)),
+        ("valid", bounds.valid.rate or None, "audit, section 3 (i)", (union,)),
+        ("improved", improved or None, "audit, section 3 (ii)", (union,)),
+        ("floquet", bounds.floquet_rate, "audit, section 7", (union, periodic)),
+    )
+    transients = entries(
+        "transient",
+        "1",
+        ("printed", None, "paper, eq:stm inequality, leaves m_v open", ()),
+        ("valid", bounds.valid.overshoot if bounds.valid.rate else None, "audit, section 3, m_v", (union,)),
+        (
+            "improved",
+            math.exp(improved * analysis.window) if improved else None,
+            "audit, section 3, in the coordinates xi",
+            (union,),
+        ),
+        ("floquet", analysis.overshoot if analysis.is_periodic else None, "audit, section 7", (union, periodic)),
+    )
+    radii = entries(
+        "radius",
+        ball,
+        (
+            "printed",
+            bounds.printed_radius if _is_papers(bounds) else None,
+            "paper, theorem 2, rho kappa_2",
+            (tree, paper, "beta below the printed rate"),
+        ),
+        ("valid", bounds.valid_radius, "audit, section 5.2", (union, errors, "beta below the valid rate")),
+        ("improved", bounds.improved_radius, "audit, end of section 5.2", (union, errors)),
+        ("energy", bounds.energy_radius, "audit, section 5.3", (union, errors, "beta below the Floquet rate")),
+        ("exact", bounds.exact_radius, "audit, section 7", (union, errors, "beta below the Floquet rate")),
+        ("observed", None if seen is None else seen.radius, "run", ()),
+    )
+    gaps = entries(
+        "min_gap",
+        "s",
+        (
+            "printed",
+            bounds.printed_gap if _is_papers(bounds) else None,
+            "paper, eq:zeno dynamic upper bound",
+            (tree, paper, "beta below the printed rate"),
+        ),
+        ("valid", bounds.valid_gap, "audit, section 6, Lambert form", (union, errors, "beta below the valid rate")),
+        (
+            "improved",
+            bounds.improved_gap,
+            "audit, section 6, logarithmic, per edge, excitation-aware",
+            (union, errors, "beta below the Floquet rate"),
+        ),
+        ("observed", None if seen is None else seen.min_gap, "run", ()),
+    )
+    return (*rates, *transients, *radii, *gaps)
+
+
+def _is_papers(bounds: Bounds) -> bool:
+    scenario = bounds.analysis.scenario
+    return scenario.trigger.kind in PAPER_LAWS and scenario.channel.ideal

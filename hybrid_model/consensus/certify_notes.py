@@ -1,0 +1,142 @@
+"""The sentences beside the numbers of `certify`: failed hypotheses, what remains true, refuted printed numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from hybrid_model.consensus.analysis import Analysis
+from hybrid_model.consensus.bounds import Bounds, with_threshold
+from hybrid_model.consensus.hypotheses import PAPER_LAWS, Hypothesis
+from hybrid_model.consensus.observed import Observation
+from hybrid_model.consensus.trees import tree_radii
+
+__all__ = ["scenario_notes"]
+
+_NEGLIGIBLE = 0.01
+
+
+def scenario_notes(bounds: Bounds, hypotheses: Sequence[Hypothesis], seen: Observation | None) -> Iterator[str]:
+    """All notes on a scenario whose union of graphs is connected."""
+    for hypothesis in hypotheses:
+        if not hypothesis.holds:
+            yield f"Hypothesis '{hypothesis.name}' fails: {hypothesis.detail} {_remains(hypothesis, bounds)}".strip()
+    yield from _constants(bounds.analysis)
+    yield from _radius_notes(bounds)
+    yield from _refuted(bounds, seen)
+    if seen is not None and seen.radius is not None and seen.initial_share is not None:
+        largest = max(bounds.exact_radius or 0.0, seen.radius)
+        if seen.initial_share > _NEGLIGIBLE * largest:
+            yield (
+                f"The run ends early: the share of the initial state in ||x_e|| is still up to "
+                f"{seen.initial_share:.6g} in its last cycle; the observed radius leaves that share out."
+            )
+
+
+def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
+    """What is still true when a hypothesis fails."""
+    analysis, name = bounds.analysis, hypothesis.name
+    end = analysis.scenario.stop_time
+    if name == "exciting tree":
+        return "The tree-free, energy and exact forms need no tree."
+    if name == "beta below the printed rate":
+        return "The printed bound does not exist; the energy and exact forms need beta below the Floquet rate only."
+    if name == "beta below the valid rate":
+        bound = bounds.valid
+        if bound.kappa1 is None or bound.kappa2 is None:
+            return ""
+        factor, kappa1, kappa2 = bound.edge_factor, bound.edge_factor * bound.kappa1, bound.edge_factor * bound.kappa2
+        if bound.decay == bound.rate:
+            shape = f"({factor * bound.transient:.6g} + {kappa2:.6g} (1 + t/{bound.window:.6g}))"
+        else:
+            shape = f"{kappa1:.6g}"
+        return f"No valid factor of exp(-beta t) exists; still ||x_e(t)|| <= {shape} exp(-{bound.rate:.6g} t)."
+    if name == "beta below the Floquet rate":
+        gap = bounds.gap_until(end)
+        still = "" if gap is None else f"; no two broadcasts of an agent up to {end:.6g} s are closer than {gap:.6g} s"
+        return (
+            "The threshold falls faster than disagreement can, so gaps shrink without a uniform bound. Consensus is "
+            f"still reached, at the Floquet rate, and no Zeno behaviour occurs{still}."
+        )
+    if name == "periodic weights":
+        return "There is no Floquet rate; the exact radius is that of the run up to the stop time."
+    if name == "bounded errors":
+        return "Only the rate of the network without errors is certified."
+    return ""
+
+
+def _constants(analysis: Analysis) -> Iterator[str]:
+    window = analysis.window
+    tree, m, n = analysis.tree_weights, analysis.tree_coordinates, analysis.disagreement
+    yield (
+        f"Excitation over every window of T = {window:.6g} s, tree {list(analysis.tree.tree)}: "
+        f"W_tau mu1 = {tree.mu1:.7g}, mu2 = {tree.mu2:.7g}; M mu1 = {m.mu1:.7g}, mu2 = {m.mu2:.7g}, "
+        f"sup int ||M|| = {m.mu2_bar:.7g}; N mu1 = {n.mu1:.7g}, mu2 = {n.mu2:.7g}, sup int ||N|| = {n.mu2_bar:.7g}, "
+        f"||int N||_F = {n.frobenius:.7g}."
+    )
+    if analysis.spectrum is not None:
+        multipliers = ", ".join(f"{abs(value):.6g}" for value in analysis.spectrum.multipliers)
+        yield f"Moduli of the Floquet multipliers over {analysis.spectrum.period:.6g} s: {multipliers}."
+
+
+def _radius_notes(bounds: Bounds) -> Iterator[str]:
+    scenario = bounds.analysis.scenario
+    found = tree_radii(bounds.analysis)
+    if len(found) > 1:
+        least, most = min(found, key=lambda t: t.kappa2), max(found, key=lambda t: t.kappa2)
+        best = min(found, key=lambda t: t.radius)
+        yield (
+            f"Over the {len(found)} exciting spanning trees, with beta = 0: kappa_2^m = {least.kappa2:.6g} (tree "
+            f"{list(least.tree)}), kappa_2^M = {most.kappa2:.6g} (tree {list(most.tree)}); every tree bounds the same "
+            f"x_e, so the least rho kappa_2 = {best.radius:.6g} (tree {list(best.tree)}) is a bound."
+        )
+    if bounds.parts and all(decay > 0 for _, decay in bounds.parts):
+        constant = Bounds(_static(bounds.analysis))
+        numbers = {
+            "printed": constant.printed_radius,
+            "valid": constant.valid_radius,
+            "energy": constant.energy_radius,
+            "exact": constant.exact_radius,
+        }
+        listing = ", ".join(f"{form} {value:.6g}" for form, value in numbers.items() if value is not None)
+        yield (
+            "The threshold decays, so x_e goes to 0 and the radii are factors of exp(-beta t). "
+            f"With the threshold held at c = {scenario.trigger.threshold:.6g} (beta = 0) the radii are: {listing}."
+        )
+
+
+def _static(analysis: Analysis) -> Analysis:
+    copy = replace(analysis, scenario=with_threshold(analysis.scenario, analysis.scenario.trigger.threshold, 0.0))
+    # Everything but the trigger is the same: what is known of the network is kept.
+    for name, value in analysis.__dict__.items():
+        if name not in ("scenario", "tree", "window", "resolution"):
+            copy.__dict__[name] = value
+    return copy
+
+
+def _refuted(bounds: Bounds, seen: Observation | None) -> Iterator[str]:
+    """Printed numbers that this very scenario contradicts, and those that are wrong in general."""
+    printed, valid = bounds.printed, bounds.valid
+    if printed.rate > valid.rate > 0:
+        yield (
+            f"The printed rate {printed.rate:.6g}/s uses mu2 of W_tau where the proof needs mu2 of M; with that it is "
+            f"{valid.rate:.6g}/s (audit, section 3)."
+        )
+    if bounds.floquet_rate is not None and printed.rate > bounds.floquet_rate * (1 + 1e-9):
+        yield f"The printed rate {printed.rate:.6g}/s is false here: the Floquet rate is {bounds.floquet_rate:.6g}/s."
+    if bounds.analysis.scenario.trigger.kind not in PAPER_LAWS:
+        return
+    gap = bounds.printed_gap
+    if gap is not None and printed.kappa1 is not None and printed.kappa1 < 0:
+        trigger = bounds.analysis.scenario.trigger
+        limit = trigger.threshold / (bounds.printed_speed * (printed.kappa2 or 1.0))
+        yield (
+            f"The printed minimum gap {gap:.6g} s is not one: kappa_1 = {printed.kappa1:.6g} is negative, so its "
+            f"formula is not the least value of its own inequality, which tends to {limit:.6g} s; "
+            "hybrid_model.consensus.counterexamples.minimum_gap() shows a run that violates the formula."
+        )
+        if seen is not None and seen.min_gap is not None and gap > seen.min_gap:
+            yield f"This run violates the printed minimum gap: two broadcasts are {seen.min_gap:.6g} s apart."
+    exact = bounds.exact_radius
+    if bounds.printed_radius is not None and exact is not None and bounds.printed_radius < exact * (1 - 1e-6):
+        yield f"The printed radius {bounds.printed_radius:.6g} is false here: errors exist that reach {exact:.6g}."

@@ -1,0 +1,109 @@
+"""The energy bound on disagreement, and how large the share of the initial state gets (audit, section 5.3)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid_model.consensus.analysis import Analysis
+from hybrid_model.consensus.excitation import Signal, scenario_excitation
+from hybrid_model.consensus.graphs import disagreement_basis, incidence
+
+__all__ = ["energy_radius", "improved_contraction", "initial_peaks"]
+
+_MULTIPLES = 10
+_FORGOTTEN = 1e-9
+_MOST_CYCLES = 5000
+
+
+def improved_contraction(analysis: Analysis) -> float:
+    """``gamma* = 2 mu1/(1 + mu2 + ||P||_F^2/2)`` of ``k N``: the share of ``||xi||^2`` lost every window.
+
+    Source: audit, section 3 (ii). 0.0 if the excitation is not persistent.
+    """
+    constants, gain = analysis.disagreement, analysis.scenario.network.gain
+    if constants.mu1 <= 1e-12 * constants.mu2:
+        return 0.0
+    return 2 * gain * constants.mu1 / (1 + gain * constants.mu2 + (gain * constants.frobenius) ** 2 / 2)
+
+
+def energy_radius(analysis: Analysis, decay: float) -> float | None:
+    """Bound on ``limsup exp(beta t) ||x_e(t)||`` for the threshold ``exp(-beta t)``; None if it does not exist.
+
+    ``edge_gain c_n sqrt(k nubar/2) e^{beta T} sqrt(1 - q)/(1 - e^{beta T} sqrt q)`` with the exact contraction q over
+    T, or ``q = 1 - gamma*`` if the weights have no period. T is the cycle or a multiple that serves better.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The scenario.
+    decay : float
+        beta [1/s].
+    """
+    gain = analysis.scenario.network.gain
+    window, nubar, root = _cycle_constants(analysis)
+    best = math.inf
+    for count in range(_MULTIPLES):
+        multiple = 2**count
+        growth = math.exp(min(decay * window * multiple, 700.0))
+        if growth * root**multiple >= 1:
+            continue
+        # 1 - q from its logarithm: q is close to 1 for short windows.
+        lost = -math.expm1(2 * multiple * math.log(root)) if root > 0 else 1.0
+        best = min(best, math.sqrt(gain * nubar * multiple / 2 * lost) * growth / (1 - growth * root**multiple))
+    return analysis.edge_gain * analysis.box_gain * best if math.isfinite(best) else None
+
+
+def _cycle_constants(analysis: Analysis) -> tuple[float, float, float]:
+    """T, ``sup int ||N||`` over T, and the square root of q over T."""
+    if not analysis.is_periodic:
+        return analysis.window, analysis.disagreement.mu2_bar, math.sqrt(1 - improved_contraction(analysis))
+    if analysis.is_constant and analysis.spectrum is not None:
+        window = analysis.window
+        return window, analysis.disagreement.mu2_bar, math.exp(-analysis.spectrum.rate * window)
+    if analysis.window == analysis.cycle:
+        return analysis.cycle, analysis.disagreement.mu2_bar, analysis.contraction
+    over_cycle = scenario_excitation(analysis.scenario, Signal.DISAGREEMENT, window=analysis.cycle)
+    return analysis.cycle, over_cycle.mu2_bar, analysis.contraction
+
+
+def initial_peaks(analysis: Analysis, decay: float) -> tuple[float, NDArray[np.float64]]:
+    """Suprema over t >= 0 of ``exp(beta t) ||x_e(t)||`` and ``exp(beta t) |x_i - x_j|`` without trigger errors.
+
+    Returns
+    -------
+    norm : float
+        Over the underlying graph.
+    pairs : ndarray, shape (m,)
+        For each listed edge.
+
+    Notes
+    -----
+    The suprema are over the ends of short cells; what lies between is covered by a bound on the curvature: over a cell
+    with ``k int ||N|| <= d`` a component leaves the larger of its end values by at most ``d^2/8 ||xi||``.
+    """
+    network, cells = analysis.scenario.network, analysis.cells
+    basis = disagreement_basis(network.agents)
+    edges = basis.T @ np.hstack([incidence(network.agents, e) for e in (network.edges, network.underlying_edges)])
+    listed = len(network.edges)
+    lengths = np.where(cells.is_idle, 0.0, np.diff(cells.times))
+    bulge = (1 + max(analysis.resolution, 0.02) ** 2) * math.exp(decay * float(np.max(lengths)))
+    path, state = np.empty((len(cells.flows) + 1, basis.shape[1])), analysis.initial_disagreement
+    pairs, norm, start, least = np.zeros(listed), 0.0, 0.0, _FORGOTTEN * float(np.linalg.norm(state))
+    for _ in range(_MOST_CYCLES):
+        path[0] = state
+        for j, flow in enumerate(cells.flows):
+            path[j + 1] = flow @ path[j]
+        growth = np.exp(decay * (start + cells.times))[:, None]
+        values = np.abs(path @ edges)
+        slack = (bulge - 1) * math.sqrt(2.0) * np.linalg.norm(path, axis=1)[:, None]
+        pairs = np.maximum(pairs, np.max((values[:, :listed] + slack) * growth, axis=0))
+        norms = np.linalg.norm(values[:, listed:], axis=1)
+        norm = max(norm, float(np.max(norms * growth[:, 0])) * bulge)
+        state, start = path[-1], start + float(cells.times[-1])
+        rest = float(np.linalg.norm(state)) * math.exp(decay * (start + float(cells.times[-1])))
+        if rest <= least or not analysis.is_periodic:
+            break
+    return norm, np.maximum(pairs, math.sqrt(2.0) * rest)

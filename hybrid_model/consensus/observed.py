@@ -1,0 +1,83 @@
+"""What a run shows of the quantities that certificates bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid_model import HybridArc
+from hybrid_model.consensus.analysis import Analysis
+from hybrid_model.consensus.graphs import disagreement_basis
+from hybrid_model.consensus.network import agent_name
+from hybrid_model.consensus.report import edge_norm, run_report
+
+__all__ = ["TIME_TOLERANCE", "Observation", "observe"]
+
+TIME_TOLERANCE = 1e-8
+"""Event times [s] are ill-conditioned where a weight is near zero; they are trusted to this (audit, section 10)."""
+
+
+@dataclass(frozen=True)
+class Observation:
+    """A run in numbers that can be compared with bounds.
+
+    Attributes
+    ----------
+    min_gap : float or None
+        Shortest time [s] between two broadcasts of one agent, less the numerical tolerance of two event times; None if
+        no agent broadcast twice.
+    radius : float or None
+        Largest ``exp(beta t) (||x_e(t)|| - ||x_e(t) without errors||)`` over the last cycle: what is left once the
+        share of the initial state is taken off. Never above the exact worst case. None without a network that reaches
+        consensus.
+    initial_share : float or None
+        Largest ``exp(beta t) ||x_e(t) without errors||`` over the last cycle.
+    """
+
+    min_gap: float | None
+    radius: float | None
+    initial_share: float | None
+
+
+def observe(analysis: Analysis, arc: HybridArc) -> Observation:
+    """Take the figures from the run of a scenario's closed loop.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The scenario; its cycle decides which part of the run counts as late.
+    arc : HybridArc
+        The run of ``closed_loop(scenario)``.
+    """
+    scenario = analysis.scenario
+    gap = run_report(scenario, arc).min_gap
+    times, free = undisturbed(analysis, float(arc.t[-1]))
+    names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
+    states = np.array([arc.at(name, times) for name in names])
+    growth = np.exp(scenario.trigger.decay * times)
+    share = edge_norm(scenario, free) * growth
+    return Observation(
+        min_gap=None if gap is None else gap - 2 * TIME_TOLERANCE,
+        radius=max(0.0, float(np.max(edge_norm(scenario, states) * growth - share))),
+        initial_share=float(np.max(share)),
+    )
+
+
+def undisturbed(analysis: Analysis, end: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Times [s] of the last cycle before `end` and the states there without trigger errors, shape (n, times)."""
+    cells = analysis.cells
+    length = float(cells.times[-1])
+    count = max(0, int(np.floor(end / length)) - 1) if analysis.is_periodic else 0
+    state = np.linalg.matrix_power(cells.product(), count) @ analysis.initial_disagreement
+    path = [state]
+    for flow in [*cells.flows, *cells.flows] if analysis.is_periodic else cells.flows:
+        path.append(flow @ path[-1])
+    times = np.append(count * length + cells.times[:-1], (count + 1) * length + cells.times)
+    times = times if analysis.is_periodic else cells.times
+    late = (times <= end) & (times >= end - length)
+    network = analysis.scenario.network
+    mean = float(np.mean(network.initial))
+    states = disagreement_basis(network.agents) @ np.array(path).T + mean
+    return times[late], states[:, late]
