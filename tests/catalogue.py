@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import control
 import numpy as np
 from catalogue_triggers import trigger_cases
+from catalogue_weights import weights_cases
 
 import hybrid_model as hm
 import hybrid_model.models
@@ -53,6 +54,7 @@ def cases():
     found |= mechanics_cases()
     found |= linear_cases()
     found |= trigger_cases(Case)
+    found |= weights_cases(Case)
     for kind in ("static", "dynamic"):
         scenario = replace_trigger(paper, kind)
         found[f"paper_{kind}"] = Case(closed_loop(scenario), 20.0)

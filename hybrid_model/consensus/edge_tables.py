@@ -5,6 +5,7 @@ The held row is a discrete state, so the flow between two rows costs no search t
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -28,6 +29,10 @@ class TableClock(hm.HybridAutomaton):
     def held(self, row: Value, s: hm.Values) -> dict[str, Value]:
         """The values that are held while row number `row` is in force."""
         return {}
+
+    @abstractmethod
+    def outputs(self, s: hm.Values) -> dict[str, Value]:
+        """The weights."""
 
     def start_map(self, s: hm.Values) -> dict[str, Value]:
         """The row that holds the start time."""
@@ -105,7 +110,7 @@ class FunctionWeights(TableClock):
 
     def __init__(self, functions: Sequence[Callable[[Any], Any]], name: str | None = None, **values: Any) -> None:
         self.functions = tuple(functions)
-        super().__init__(name, degree=len(self.functions), **values)
+        super().__init__(name, degree=len(self.functions), **{"starts": [0.0], **values})
 
     def outputs(self, s: hm.Values) -> dict[str, Value]:
         """The weights."""

@@ -6,6 +6,7 @@ breakpoints are computed from the index, and the value at a breakpoint belongs t
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import ClassVar
 
 import numpy as np
@@ -47,6 +48,10 @@ class GateClock(hm.HybridAutomaton):
     duty_percent = hm.Parameter(20.0, shape="degree", description="share of each gate period that is on, in percent")
     phase = hm.Parameter(0.0, shape="degree", unit="rad", description="phase of the gate")
     weights = hm.Output(shape="degree", unit="1/s", description="weights of the edges")
+
+    @abstractmethod
+    def outputs(self, s: hm.Values) -> dict[str, Value]:
+        """The weights."""
 
     def start_map(self, s: hm.Values) -> dict[str, Value]:
         """The segment that holds the start time."""
