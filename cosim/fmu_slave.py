@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -60,7 +61,7 @@ class FmuSlave(Slave):
         self._token = description.instantiationToken
         self._identifier = description.coSimulation.modelIdentifier
         self._path = str(path)
-        self._folder: str | None = None
+        self._library: FMU3Slave | None = None
         self._fmu: FMU3Slave | None = None
         self._starts: dict[str, float] = {}
         self._getters: dict[str, tuple[Callable[[list[int]], list[Any]], list[int]]] = {}
@@ -89,18 +90,22 @@ class FmuSlave(Slave):
         getter, reference = self._getters[name]
         return float(self._call(getter, reference)[0])
 
+    def load(self) -> FMU3Slave:
+        """Load the FMU's binary, once for all runs; `start` does it if nobody has."""
+        if self._library is None:
+            folder = extract(self._path)
+            self._library = FMU3Slave(
+                guid=self._token, unzipDirectory=folder, modelIdentifier=self._identifier, instanceName=self.name
+            )
+            weakref.finalize(self, _unload, self._library, folder)
+        return self._library
+
     def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
         """See `Slave.start`."""
         if events and not self.has_event_mode:
             raise CosimError(f"{self.name} has no event mode: use the fixed-step master.")
         self._events = events
-        self._folder = extract(self._path)
-        self._fmu = FMU3Slave(
-            guid=self._token,
-            unzipDirectory=self._folder,
-            modelIdentifier=self._identifier,
-            instanceName=self.name,
-        )
+        self._fmu = self.load()
         try:
             self._fmu.instantiate(eventModeUsed=events, earlyReturnAllowed=events, logMessage=self._log)
         except Exception as error:
@@ -148,12 +153,9 @@ class FmuSlave(Slave):
     def close(self) -> None:
         """See `Slave.close`."""
         if self._fmu is not None:
-            self._fmu.freeInstance()
+            self._fmu.fmi3FreeInstance(self._fmu.component)
             self._fmu = None
-        if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
-            self._folder = None
-        self._getters.clear()
+        self._messages.clear()
 
     @property
     def _instance(self) -> FMU3Slave:
@@ -187,6 +189,11 @@ class FmuSlave(Slave):
 
     def _said(self) -> str:
         return self._messages[-1] if self._messages else "the FMU logged no message"
+
+
+def _unload(library: FMU3Slave, folder: str) -> None:
+    library.freeLibrary()
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _port(variable: Any) -> Port:

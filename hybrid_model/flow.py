@@ -129,6 +129,9 @@ class _FlowMap:
         self._execution = execution
         # Inputs are continuous from the right: the last stage of a step that ends at a breakpoint belongs to the left.
         self._last = float(np.nextafter(end, -np.inf)) if execution.inputs.vary else end
+        # This is the innermost loop of a run: what does not change along a flow is looked up once.
+        self._rates, self._z, self._p = execution.maps.rates, execution.z, execution.p
+        self._held = None if execution.inputs.vary else execution.inputs.at(execution.t)
         self.forget()
 
     def forget(self) -> None:
@@ -138,8 +141,11 @@ class _FlowMap:
 
     def __call__(self, t: float, x: FloatArray) -> FloatArray:
         execution = self._execution
-        rates = execution.rates_at(min(t, self._last), x)
-        if not np.isfinite(rates).all():
+        t = min(t, self._last)
+        u = execution.inputs.at(t) if self._held is None else self._held
+        rates = self._rates(t, x, self._z, u, self._p)
+        # A sum is finite if its terms are, but for an overflow.
+        if not math.isfinite(rates.sum()) and not np.isfinite(rates).all():
             self.trouble = f"derivative of {not_finite(execution.layout, Kind.STATE, rates)} at t = {t:.9g} s"
         if self.trouble:
             self._count += 1

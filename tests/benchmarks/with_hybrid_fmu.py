@@ -66,13 +66,17 @@ def co_simulate(problem, tolerance):
     else:
         fmus = {"ball": export_fmu(automaton_of(problem), Path(folder.name) / "ball.fmu")}
 
+    consensus = isinstance(problem, Consensus)
+    system = fmu_system(problem.scenario, fmus) if consensus else System([FmuSlave("ball", fmus["ball"])], {})
+    for slave in system.slaves.values():
+        slave.load()
+
     def run(_keep=folder):
-        if isinstance(problem, Consensus):
-            result = run_event_exact(fmu_system(problem.scenario, fmus), problem.t_end)
+        result = run_event_exact(system, problem.t_end)
+        if consensus:
             report = network_report(problem.scenario, result)
             events, x_end = report.event_times, report.x_end
         else:
-            result = run_event_exact(System([FmuSlave("ball", fmus["ball"])], {}), problem.t_end)
             events = [result.tick_times("ball", "impact")]
             x_end = np.array([result.final["ball.h"], result.final["ball.v"]])
         ended = "end time" if result.ended is Ended.HORIZON else f"{result.ended.name}: {result.message}"
