@@ -7,9 +7,9 @@ Between two broadcasts every broadcast value is constant, so
 and the integrals of the weights are elementary. Windows, dwell intervals and integrals are written out here once more,
 from the formulas of the paper's section 7, and share no code with the package.
 
-An event is the first root of ``f(t) = |xhat_i - x_i(t)| - c exp(-beta t)``. It is approached from the left by steps
-that cannot pass it: with ``f'' <= K`` the parabola ``f + f' h + K h^2/2`` lies above f, so f has no root before the
-parabola has one. Near a root this is Newton's method. No root is skipped, however many lie in one piece.
+An event is the first root of ``f(t) = |xhat_i - x_i(t)| - c0 - c exp(-beta t)``. It is approached from the left by
+steps that cannot pass it: with ``f'' <= K`` the parabola ``f + f' h + K h^2/2`` lies above f, so f has no root before
+the parabola has one. Near a root this is Newton's method. No root is skipped, however many lie in one piece.
 """
 
 from dataclasses import dataclass
@@ -17,10 +17,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid_model.consensus.scenario import NoSwitching, Scenario
+from hybrid_model.consensus.scenario import NoSwitching, Scenario, TriggerKind
 from hybrid_model.consensus.weights import ConstantWeight, WeightMap
 
 EPS = np.finfo(float).eps
+THRESHOLDS = (TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.MIXED, TriggerKind.SELF_TRIGGERED)
+"""Triggers that broadcast when ``|e|`` meets ``offset + threshold exp(-decay t)``; self-triggered is the same set."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,11 @@ class ClosedLoop:
 
     def __init__(self, scenario):
         network = scenario.network
-        self.gain, self.threshold, self.decay = network.gain, scenario.trigger.threshold, scenario.trigger.decay
+        trigger = scenario.trigger
+        if trigger.kind not in THRESHOLDS:
+            raise ValueError(f"the trigger {trigger.kind.value} is no threshold of |e| that is watched at all times")
+        self.gain, self.offset = network.gain, trigger.offset
+        self.threshold, self.decay = trigger.threshold, trigger.decay
         self.t = 0.0
         self.x = np.array(network.initial, dtype=float)
         self.broadcast = self.x.copy()
@@ -94,11 +100,12 @@ class ClosedLoop:
         curvature = self.gain * self.absolute_sums(piece.slope_bound())
         t = self.t
         while True:
-            level = self.threshold * np.exp(-self.decay * t)
+            decaying = self.threshold * np.exp(-self.decay * t)
+            level = self.offset + decaying
             error = self.broadcast - self.states(piece, t)
             margin = np.stack((error, -error)) - level
             rate = self.gain * self.node_sums(piece.value(t))
-            slope = np.stack((rate, -rate)) + self.decay * level
+            slope = np.stack((rate, -rate)) + self.decay * decaying
             step = safe_step(margin, slope, np.stack((curvature, curvature)))
             resolved = 4 * EPS * max(1.0, t)
             noise = 4 * EPS * max(1.0, float(np.abs(self.x).max()))
