@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid_model.consensus.excitation import ExcitationConstants, Signal, scenario_excitation
+from hybrid_model.consensus.excitation import Signal, WindowExtremes, scenario_excitation
 from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.spanning_trees import TreePartition
 
@@ -21,6 +21,7 @@ __all__ = [
     "convergence_bound",
     "default_window",
     "rate_of_contraction",
+    "tree_contraction",
     "tree_free_rate",
 ]
 
@@ -140,7 +141,7 @@ def convergence_bound(
 
     smallest, largest = float(tree.Lambda[0]), float(tree.Lambda[-1])
     p = network.agents - 1
-    gamma = _tree_contraction(constants, network.gain, smallest, largest, p)
+    gamma = tree_contraction(constants, network.gain, smallest, largest, p)
     overshoot = math.sqrt(largest / smallest / (1 - gamma))
     error_bound = 2 * trigger.threshold * math.sqrt(p)
     mu2 = constants.mu2 if form is BoundForm.PRINTED else constants.mu2_bar
@@ -177,12 +178,12 @@ def default_window(scenario: Scenario, partition: TreePartition) -> float:
     return _SHORT / speed if speed > 0 else 1.0
 
 
-def tree_free_rate(constants: ExcitationConstants, gain: float) -> float:
+def tree_free_rate(constants: WindowExtremes, gain: float) -> float:
     """Rate [1/s] from ``gamma* = 2 mu1/(1 + mu2 + ||P||_F^2/2)`` with the constants of ``k N`` (audit, section 3 (ii)).
 
     Parameters
     ----------
-    constants : ExcitationConstants
+    constants : WindowExtremes
         Those of N, `Signal.DISAGREEMENT`.
     gain : float
         k.
@@ -196,8 +197,20 @@ def rate_of_contraction(gamma: float, window: float) -> float:
     return -math.log1p(-gamma) / (2 * window)
 
 
-def _tree_contraction(constants: ExcitationConstants, gain: float, smallest: float, largest: float, p: int) -> float:
-    """gamma of theorem 1; 0.0 if mu1 is zero up to rounding."""
+def tree_contraction(constants: WindowExtremes, gain: float, smallest: float, largest: float, p: int) -> float:
+    """gamma of theorem 1; 0.0 if mu1 is zero up to rounding.
+
+    Parameters
+    ----------
+    constants : WindowExtremes
+        Those of W_tau (printed) or M (valid).
+    gain : float
+        k.
+    smallest, largest : float
+        Extreme eigenvalues of Lambda.
+    p : int
+        Number of edges of the tree.
+    """
     if constants.mu1 <= _ZERO * constants.mu2:
         return 0.0
     return 2 * gain * smallest * constants.mu1 / (1 + gain * math.sqrt(p) * largest * constants.mu2) ** 2

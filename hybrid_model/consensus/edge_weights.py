@@ -11,7 +11,7 @@ from hybrid_model.consensus.periods import common_period
 from hybrid_model.consensus.switching import Switching
 from hybrid_model.consensus.weights import Waveform
 
-__all__ = ["EdgeWeights", "Piece"]
+__all__ = ["EdgeWeights", "Piece", "WeightPrimitive"]
 
 _MERGE = 16 * np.finfo(float).eps
 
@@ -116,6 +116,10 @@ class EdgeWeights:
         # The amplitude is taken at the middle, where rounding of a boundary cannot pick the neighbouring segment.
         return [Piece(a, b, self.amplitudes((a + b) / 2), carriers) for a, b in pairwise(times) if a < b]
 
+    def primitive(self, start: float, end: float) -> "WeightPrimitive":
+        """The integrals from `start` [s] as a function that is quick to call, for many times up to `end` [s]."""
+        return WeightPrimitive(self.pieces(start, end))
+
     def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
         """Exact integrals of the weights from `t0` to `t1` [s], shape (..., m) for broadcast times of shape (...)."""
         begin, end = np.broadcast_arrays(np.asarray(t0, dtype=float), np.asarray(t1, dtype=float))
@@ -126,6 +130,32 @@ class EdgeWeights:
             _masked_integral(waveform, cuts, masks[:, edge], begin, end) for edge, waveform in enumerate(self.waveforms)
         ]
         return np.stack(columns, axis=-1)
+
+
+class WeightPrimitive:
+    """The function ``t -> int_start^t w ds`` of all edges, from closed forms on pieces.
+
+    Parameters
+    ----------
+    pieces : list of Piece
+        An interval, cut at the breakpoints; at least one piece.
+    """
+
+    def __init__(self, pieces: list[Piece]) -> None:
+        self._cuts = np.array([piece.start for piece in pieces])
+        self._amplitudes = np.array([piece.amplitudes for piece in pieces])
+        self._carriers = pieces[0].carriers
+        ends = np.array([piece.end for piece in pieces])
+        parts = [carrier.integral(self._cuts, ends) for carrier in self._carriers]
+        steps = self._amplitudes * np.stack(parts, axis=-1)
+        self._before = np.concatenate((np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)))
+
+    def __call__(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Integrals up to `times` [s], shape (s,), within the interval; shape (s, m)."""
+        place = np.clip(np.searchsorted(self._cuts, times, side="right") - 1, 0, len(self._amplitudes) - 1)
+        begins = self._cuts[place]
+        inside = np.stack([carrier.integral(begins, times) for carrier in self._carriers], axis=-1)
+        return np.asarray(self._before[place] + self._amplitudes[place] * inside)
 
 
 def _masked_integral(

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from hybrid_model.consensus.edge_weights import EdgeWeights
 from hybrid_model.consensus.graphs import disagreement_basis, incidence
@@ -19,9 +18,20 @@ from hybrid_model.consensus.norm_integral import NormPrimitive
 from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.spanning_trees import TreePartition
 
-__all__ = ["ExcitationConstants", "Signal", "excitation_constants", "scenario_excitation", "signal_factor"]
+__all__ = [
+    "ExcitationConstants",
+    "Signal",
+    "WindowExtremes",
+    "excitation_constants",
+    "excitation_horizon",
+    "scenario_excitation",
+    "signal_factor",
+    "window_extremes",
+]
 
 _POINTS_PER_PIECE = 8
+_REFINED_PEAKS = 3
+_ZOOMS = 9
 
 
 class Signal(enum.Enum):
@@ -32,28 +42,41 @@ class Signal(enum.Enum):
     DISAGREEMENT = "N"
 
 
-@dataclass(frozen=True)
-class ExcitationConstants:
-    """Excitation of a positive semidefinite signal S(t) over all windows of one length.
+@dataclass(frozen=True, kw_only=True)
+class WindowExtremes:
+    """Extremes of the integrals ``int_t^{t+T} S`` of a positive semidefinite signal over all windows of one length.
 
     Parameters
     ----------
     window : float
         T [s].
     mu1, mu2 : float
-        Smallest and largest eigenvalue of ``int_t^{t+T} S`` over all t (paper,
-        definition 1, read as in audit section 2).
-    mu2_bar : float
-        ``sup_t int_t^{t+T} ||S||``, at least mu2 (audit, section 5.1).
+        Smallest and largest eigenvalue over all t (paper, definition 1, read as in audit section 2).
     frobenius : float
         ``sup_t ||int_t^{t+T} S||_F`` (audit, section 3).
+    horizon : float or None
+        None if the weights are periodic and all windows of all time are meant; otherwise the constants are those of the
+        windows inside ``[0, horizon]`` [s] and say nothing about later ones.
     """
 
     window: float
     mu1: float
     mu2: float
-    mu2_bar: float
     frobenius: float
+    horizon: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExcitationConstants(WindowExtremes):
+    """The same with the integrated norm.
+
+    Parameters
+    ----------
+    mu2_bar : float
+        ``sup_t int_t^{t+T} ||S||``, at least mu2 (audit, section 5.1).
+    """
+
+    mu2_bar: float
 
 
 def signal_factor(scenario: Scenario, signal: Signal, partition: TreePartition | None = None) -> NDArray[np.float64]:
@@ -81,12 +104,22 @@ def signal_factor(scenario: Scenario, signal: Signal, partition: TreePartition |
 def scenario_excitation(
     scenario: Scenario, signal: Signal, partition: TreePartition | None = None, window: float | None = None
 ) -> ExcitationConstants:
-    """`excitation_constants` of one signal of a scenario; see there for `window` and the errors."""
-    return excitation_constants(signal_factor(scenario, signal, partition), scenario.edge_weights, window)
+    """`excitation_constants` of one signal of a scenario; see there for `window` and the errors.
+
+    Without a period the constants are those of the windows inside the run, as their `horizon` says.
+    """
+    return excitation_constants(
+        signal_factor(scenario, signal, partition), scenario.edge_weights, window, excitation_horizon(scenario)
+    )
+
+
+def excitation_horizon(scenario: Scenario) -> float | None:
+    """None if the weights of a scenario have a period, else its stop time [s]."""
+    return scenario.stop_time if scenario.edge_weights.period is None else None
 
 
 def excitation_constants(
-    factor: NDArray[np.float64], weights: EdgeWeights, window: float | None = None
+    factor: NDArray[np.float64], weights: EdgeWeights, window: float | None = None, horizon: float | None = None
 ) -> ExcitationConstants:
     """Constants of ``S(t) = F diag(w(t)) F^T`` over all windows of length `window`.
 
@@ -95,73 +128,121 @@ def excitation_constants(
     factor : ndarray, shape (r, m)
         F.
     weights : EdgeWeights
-        Periodic or constant weights.
+        The weights.
     window : float, optional
         T [s]; by default the period of the weights.
+    horizon : float, optional
+        For weights without a period: windows inside ``[0, horizon]`` [s] only.
 
     Raises
     ------
     ValueError
-        If the weights are not periodic, the window is not positive, or none is given for constant weights.
+        If the weights have no period and no horizon is given, the window is not positive or longer than the horizon, or
+        no window is given for weights without a period or constant ones.
 
     Notes
     -----
     Every window integral is exact (closed forms); only `mu2_bar` uses quadrature, on pieces where weights of different
     shape overlap, to about ten digits. If the window is a multiple of the period, no search is needed. Otherwise the
-    starts are searched on a grid that holds all points where a window's end meets a breakpoint, and the best grid cell
-    is refined. A narrower extremum between two grid points can escape by at most the grid step times ``sup ||S||``.
+    starts are searched on a grid that holds all points where a window's end meets a breakpoint, and the best grid cells
+    are refined. For weights that are constant on pieces the extremes of mu1 and mu2 lie at such points (the smallest
+    eigenvalue is concave, the largest one and the norm convex in a window's start between them) and are exact. For
+    others a narrower extremum between two grid points can escape by at most the grid step times ``sup ||S||``.
     """
-    period = weights.period
-    if period is None:
-        raise ValueError(
-            "the weights have no common period, so the windows to search do not repeat; "
-            "choose rates and a dwell time whose quotients are simple fractions."
-        )
-    if window is None and period == 0.0:
-        raise ValueError("the weights are constant, so every window length will do; say which one to use.")
-    length = period if window is None else window
-    if not (np.isfinite(length) and length > 0):
-        raise ValueError(f"window is {length}; it must be a positive, finite number of seconds.")
+    length, starts = _windows(weights, window, horizon)
+    extremes = _extremes(factor, weights, length, starts)
+    norm = NormPrimitive(factor, weights, float(starts[0]), float(starts[-1]) + length)
+    bar = _largest(lambda at: norm(at + length) - norm(at), starts)
+    return ExcitationConstants(window=length, mu2_bar=bar, horizon=_said(weights, horizon), **extremes)
 
-    starts = _window_starts(weights, period, length)
-    norm = NormPrimitive(factor, weights, 0.0, starts[-1] + length)
+
+def window_extremes(
+    factor: NDArray[np.float64], weights: EdgeWeights, window: float | None = None, horizon: float | None = None
+) -> WindowExtremes:
+    """`excitation_constants` without the integrated norm, which takes most of the time; all else as there."""
+    length, starts = _windows(weights, window, horizon)
+    return WindowExtremes(window=length, horizon=_said(weights, horizon), **_extremes(factor, weights, length, starts))
+
+
+def _extremes(
+    factor: NDArray[np.float64], weights: EdgeWeights, length: float, starts: NDArray[np.float64]
+) -> dict[str, float]:
+    primitive = weights.primitive(float(starts[0]), float(starts[-1]) + length)
 
     def integrals(at: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray((factor * weights.integral(at, at + length)[:, None, :]) @ factor.T)
+        return np.asarray((factor * (primitive(at + length) - primitive(at))[:, None, :]) @ factor.T)
 
-    return ExcitationConstants(
-        window=length,
-        mu1=max(0.0, -_largest(lambda at: -np.linalg.eigvalsh(integrals(at))[:, 0], starts)),
-        mu2=_largest(lambda at: np.linalg.eigvalsh(integrals(at))[:, -1], starts),
-        mu2_bar=_largest(lambda at: norm(at + length) - norm(at), starts),
-        frobenius=_largest(lambda at: np.linalg.norm(integrals(at), axis=(1, 2)), starts),
-    )
+    return {
+        "mu1": max(0.0, -_largest(lambda at: -np.linalg.eigvalsh(integrals(at))[:, 0], starts)),
+        "mu2": _largest(lambda at: np.linalg.eigvalsh(integrals(at))[:, -1], starts),
+        "frobenius": _largest(lambda at: np.linalg.norm(integrals(at), axis=(1, 2)), starts),
+    }
 
 
-def _window_starts(weights: EdgeWeights, period: float, length: float) -> NDArray[np.float64]:
-    """Starts to try, ascending: one if all windows are alike, else a grid over one period with all corners."""
+def _said(weights: EdgeWeights, horizon: float | None) -> float | None:
+    return horizon if weights.period is None else None
+
+
+def _windows(weights: EdgeWeights, window: float | None, horizon: float | None) -> tuple[float, NDArray[np.float64]]:
+    """Length of the windows [s] and the starts to try."""
+    period = weights.period
+    if period is None and horizon is None:
+        raise ValueError(
+            "the weights have no common period, so the windows to search do not repeat; choose rates and a dwell time "
+            "whose quotients are simple fractions, or give a horizon up to which the constants are to hold."
+        )
+    if window is None and not period:
+        if period == 0.0:
+            raise ValueError("the weights are constant, so every window length will do; say which one to use.")
+        raise ValueError("the weights have no period, so no window length is the natural one; say which one to use.")
+    length = window if window is not None else period or 0.0
+    if not (np.isfinite(length) and length > 0):
+        raise ValueError(f"window is {length}; it must be a positive, finite number of seconds.")
+    if period is not None:
+        return length, _window_starts(weights, 0.0 if _is_multiple(length, period) else period, length)
+    last = (horizon or 0.0) - length
+    if last < 0:
+        raise ValueError(f"window is {length}, longer than the horizon of {horizon} s; choose a shorter one.")
+    return length, _window_starts(weights, last, length)
+
+
+def _is_multiple(length: float, period: float) -> bool:
     cycles = length / period if period > 0 else 1.0
-    if abs(cycles - round(cycles)) < 1e-12 * cycles:
+    return abs(cycles - round(cycles)) < 1e-12 * cycles
+
+
+def _window_starts(weights: EdgeWeights, last: float, length: float) -> NDArray[np.float64]:
+    """Starts to try from 0 to `last`, ascending: a grid with all points where a window's end meets a breakpoint."""
+    if last <= 0:
         return np.zeros(1)
     corners = np.concatenate(
-        ([0.0, period], weights.breakpoints(0.0, period), weights.breakpoints(length, length + period) - length)
+        ([0.0, last], weights.breakpoints(0.0, last), weights.breakpoints(length, length + last) - length)
     )
     corners = np.unique(corners)
     steps = np.arange(_POINTS_PER_PIECE) / _POINTS_PER_PIECE
     inner = corners[:-1, None] + np.diff(corners)[:, None] * steps
-    return np.append(inner.ravel(), period)
+    return np.append(inner.ravel(), last)
 
 
 def _largest(
     function: Callable[[NDArray[np.float64]], NDArray[np.floating[Any]]], starts: NDArray[np.float64]
 ) -> float:
-    """Supremum of `function` over the range of `starts`: the best start, refined within its two neighbours."""
-    values = function(starts)
-    best = int(np.argmax(values))
+    """Supremum of `function` over the range of `starts`: the best peaks of the grid, refined between their neighbours.
+
+    A peak is refined by grids of 17 points that shrink eightfold around their best one.
+    """
+    values = np.asarray(function(starts), dtype=float)
+    best = float(values.max())
     if len(starts) == 1:
-        return float(values[0])
-    low, high = starts[max(best - 1, 0)], starts[min(best + 1, len(starts) - 1)]
-    refined = minimize_scalar(
-        lambda at: -float(function(np.array([at]))[0]), bounds=(low, high), method="bounded", options={"xatol": 1e-12}
-    )
-    return max(float(values[best]), -float(refined.fun))
+        return best
+    padded = np.concatenate(([-np.inf], values, [-np.inf]))
+    peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))
+    for peak in peaks[np.argsort(-values[peaks], kind="stable")][:_REFINED_PEAKS].tolist():
+        low, high = starts[max(peak - 1, 0)], starts[min(peak + 1, len(starts) - 1)]
+        for _ in range(_ZOOMS):
+            at = np.linspace(low, high, 17)
+            values = np.asarray(function(at), dtype=float)
+            place = int(values.argmax())
+            best = max(best, float(values[place]))
+            low, high = at[max(place - 1, 0)], at[min(place + 1, 16)]
+    return best
