@@ -53,15 +53,20 @@ def starts(automaton):
     }
 
 
-def python_run(case):
-    """The reference: the automaton's inputs as signals with breakpoints."""
+def step_inputs(case):
+    """The inputs of a case as signals with breakpoints."""
     inputs = {}
     for variable in case.automaton.of_kind(Kind.INPUT):
         elements = element_names(variable)
         if any(name in case.steps for name in elements):
             breakpoints = sorted({t for name in elements for t, _ in case.steps.get(name, ())})
             inputs[variable.name] = hm.Signal(lambda t, v=variable: step_values(case, v, t), breakpoints)
-    return hm.simulate(case.automaton, case.t_end, inputs=inputs)
+    return inputs
+
+
+def python_run(case):
+    """The reference."""
+    return hm.simulate(case.automaton, case.t_end, inputs=step_inputs(case))
 
 
 def step_values(case, variable, t):
