@@ -13,11 +13,11 @@ from hybrid_model.variables import Value
 
 ROUNDS = 8
 """Steps of one search; one that has not arrived is taken up again from where it got to."""
-NOISE = 1e-14
+NOISE = 1e-13
 """Relative rounding of a predicted error: within it, the threshold is met."""
 RESOLVED = 1e-15
 """Steps that short, relative to the time, lead nowhere."""
-FLATTEST = 1e-9
+FLATTEST = 1e-30
 """Smallest bound of the curvature: a larger bound is a bound too, and a positive one makes every root finite."""
 TINY = 1e-300
 

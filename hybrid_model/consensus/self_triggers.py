@@ -31,6 +31,8 @@ from hybrid_model.consensus.gating import (
 from hybrid_model.consensus.triggers import EventGenerator
 from hybrid_model.variables import Value
 
+INSTANT = 1e-9
+"""In s: alarms so close are one instant."""
 NONE = -1.0
 """A time that means never: a discrete state holds finite numbers only, and no run begins before zero."""
 
@@ -116,8 +118,19 @@ class SelfTrigger(EventGenerator):
         return np.sum(np.abs(np.sign(s.neighbours - s.heard))) - 0.5
 
     def hear(self, s: hm.Values) -> dict[str, Value]:
-        """Take the neighbours' values over, and plan."""
-        return {"heard": s.neighbours, **self._plan(s, self.present(s), self.predicted(s), s.broadcast, s.neighbours)}
+        """Take the neighbours' values over, and plan.
+
+        An alarm that is set for this very instant stays set, as a crossing within the event tolerance belongs to the
+        instant of another (rule 6): rounding must not decide which of two symmetric agents broadcasts.
+        """
+        plan = self._plan(s, self.present(s), self.predicted(s), s.broadcast, s.neighbours)
+        is_now = np.logical_and(s.due >= 0.0, s.due <= s.t + INSTANT)
+        return {
+            "heard": s.neighbours,
+            **plan,
+            "due": np.where(is_now, s.t, plan["due"]),
+            "resume": np.where(is_now, NONE, plan["resume"]),
+        }
 
     def alarm(self, s: hm.Values) -> Value:
         """Time of the next broadcast."""
