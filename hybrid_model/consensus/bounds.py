@@ -231,14 +231,32 @@ class Bounds:
         norm, pairs = self._peaks(decay) if with_initial else (0.0, np.zeros(len(network.edges)))
         energy = energy_radius(analysis, decay)
         radius = min(worst.radius, math.inf if energy is None else energy) * c + norm
-        widths = c * np.array([worst.pairs[edge] for edge in network.edges]) + pairs
+        bound = self._part_bound(c, decay)
+        if bound.kappa1 is not None and bound.kappa2 is not None and decay < bound.rate:
+            start = max(bound.kappa1, 0.0) if with_initial else 0.0
+            radius = min(radius, bound.edge_factor * (start + bound.kappa2))
+        widths = np.minimum(c * np.array([worst.pairs[edge] for edge in network.edges]) + pairs, radius)
         by_degree = self._speeds_by_degree(radius, c)
         per_edge = network.gain * (widths + 2 * c)
-        level, gap = c if threshold is None else threshold, math.inf
-        for agent in range(1, network.agents + 1):
-            ends = np.array([agent in edge for edge in network.edges])
-            speed = min(float(by_degree[agent - 1]), float(ends @ (per_edge * analysis.largest_weights)))
-            gap = min(gap, max(growing_gap(level, decay, speed), excited_gap(analysis, level, decay, per_edge, agent)))
+        level = c if threshold is None else threshold
+        speeds = np.array(
+            [
+                min(
+                    float(by_degree[i - 1]),
+                    float(per_edge @ (analysis.largest_weights * [i in e for e in network.edges])),
+                )
+                for i in range(1, network.agents + 1)
+            ]
+        )
+        gap = math.inf
+        for place in np.argsort(-speeds).tolist():
+            safe = growing_gap(level, decay, float(speeds[place]))
+            if safe >= gap or analysis.is_constant:
+                gap = min(gap, safe)
+                continue
+            # A gap of a hundred cycles is as good as none: the search ends there.
+            most = min(gap, safe + 100 * analysis.cycle)
+            gap = excited_gap(analysis, level, decay, per_edge, place + 1, safe, most)
         return gap
 
     def _speeds_by_degree(self, radius: float, c: float) -> NDArray[np.float64]:

@@ -57,7 +57,7 @@ def flow_cells(scenario: Scenario, t0: float, t1: float, resolution: float, long
     t0, t1 : float
         The interval [s].
     resolution : float
-        Largest ``k int ||N||`` of a cell, about (the norm is bounded by that of the largest weights of a piece).
+        ``k ||int N||`` of a cell, on the average over each piece.
     longest : float
         Largest length [s] of a cell in which some edge carries weight.
 
@@ -83,10 +83,9 @@ def _count(piece: Piece, gain: float, factor: NDArray[np.float64], resolution: f
     if piece.is_idle:
         return 1
     length = piece.end - piece.start
-    probes = np.linspace(piece.start, piece.end, 9)
-    largest = piece.amplitudes * np.array([np.max(carrier.value(probes)) for carrier in piece.carriers])
-    speed = gain * float(np.linalg.eigvalsh((factor * largest) @ factor.T)[-1])
-    steps = length * max(speed / resolution, 1 / longest)
+    dose = piece.amplitudes * np.array([float(c.integral(piece.start, piece.end)) for c in piece.carriers])
+    spent = gain * float(np.linalg.eigvalsh((factor * dose) @ factor.T)[-1])
+    steps = max(spent / resolution, length / longest)
     if piece.shared_carrier is None:
         # The Magnus series needs carriers that are smooth over a cell: 64 cells a half wave make its error negligible.
         steps = max(steps, 64 * length * max(_rate(carrier) for carrier in piece.carriers) / np.pi)

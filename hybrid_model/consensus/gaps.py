@@ -13,8 +13,8 @@ from hybrid_model.consensus.edge_weights import EdgeWeights
 
 __all__ = ["excited_gap", "frozen_gap", "growing_gap", "printed_gap"]
 
-_BISECTIONS = 60
-_GRID = 8
+_ACCURACY = 1e-6
+_GRID = 4
 
 
 def printed_gap(threshold: float, decay: float, speed: float, kappa1: float, kappa2: float) -> float:
@@ -58,8 +58,10 @@ def growing_gap(threshold: float, decay: float, speed: float) -> float:
     return math.log1p(decay * threshold / speed) / decay
 
 
-def excited_gap(analysis: Analysis, threshold: float, decay: float, speeds: NDArray[np.float64], agent: int) -> float:
-    """Largest g [s] for which no window of length g moves the agent by its threshold.
+def excited_gap(
+    analysis: Analysis, threshold: float, decay: float, speeds: NDArray[np.float64], agent: int, low: float, high: float
+) -> float:
+    """Largest g [s] from `low` to `high` for which no window of length g moves the agent by its threshold.
 
     The agent moves by at most ``sum_e speeds[e] int w_e`` in units of ``e^{-beta t1}``, so a gap from t1 to ``t1 + g``
     needs that sum to reach ``c e^{-beta g}``.
@@ -74,28 +76,22 @@ def excited_gap(analysis: Analysis, threshold: float, decay: float, speeds: NDAr
         ``k (H_e + 2 c)`` with ``|x_i - x_j| <= H_e e^{-beta t}`` over edge e.
     agent : int
         Number of the agent, from 1.
+    low : float
+        A gap [s] that is known to be safe; returned if nothing larger is.
+    high : float
+        Largest gap [s] of interest, finite.
     """
     network, weights = analysis.scenario.network, analysis.scenario.edge_weights
     rates = np.array([speed if agent in edge else 0.0 for edge, speed in zip(network.edges, speeds, strict=True)])
-    largest = float(rates @ analysis.largest_weights)
-    if largest <= 0:
-        return math.inf
-    low = growing_gap(threshold, decay, largest)
-    if analysis.is_constant:
-        return low
-    high = max(2 * low, analysis.cycle)
-    while _moved(weights, rates, analysis, high) < threshold * math.exp(-decay * high):
-        low, high = high, 2 * high
-        if high > 1e6 * analysis.cycle:
-            return low
-    for _ in range(_BISECTIONS):
+
+    def is_safe(gap: float) -> bool:
+        return _moved(weights, rates, analysis, gap) < threshold * math.exp(-decay * gap)
+
+    if is_safe(high):
+        return high
+    while high - low > _ACCURACY * low:
         middle = (low + high) / 2
-        if middle in (low, high):
-            break
-        if _moved(weights, rates, analysis, middle) < threshold * math.exp(-decay * middle):
-            low = middle
-        else:
-            high = middle
+        low, high = (middle, high) if is_safe(middle) else (low, middle)
     return low
 
 
@@ -118,7 +114,7 @@ def _moved(weights: EdgeWeights, rates: NDArray[np.float64], analysis: Analysis,
 
 def _vertex_rise(t: NDArray[np.float64], y: NDArray[np.float64]) -> float:
     """How far the parabola through three points rises above the largest of them; 0.0 if it does not."""
-    if len(t) < 3:
+    if len(t) < 3 or np.min(np.diff(t)) <= 0:
         return 0.0
     left, right = (y[1] - y[0]) / (t[1] - t[0]), (y[2] - y[1]) / (t[2] - t[1])
     bend = (right - left) / (t[2] - t[0])

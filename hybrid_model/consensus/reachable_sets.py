@@ -24,7 +24,9 @@ from hybrid_model.consensus.scenario_data import Scenario
 __all__ = ["ReachableSets"]
 
 _ITERATIONS = 200
-_INSIDE = 6
+_APART = 0.5
+"""``k int ||N||`` between two times at which suprema are looked for."""
+
 _STALLED = 1e-10
 _TAIL = 1e-11
 _MOST_CYCLES = 20_000
@@ -54,7 +56,7 @@ class ReachableSets:
         self, scenario: Scenario, period: float, decay: float, resolution: float, *, periodic: bool = True
     ) -> None:
         """Cut one period into cells."""
-        self._periodic = periodic
+        self._periodic, self._resolution = periodic, resolution
         longest = resolution / decay if decay > 0 else np.inf
         self._cells: FlowCells = flow_cells(scenario, 0.0, period, resolution, longest)
         self._period, self._decay = period, decay
@@ -105,8 +107,12 @@ class ReachableSets:
         # Without a period nothing happened before the start.
         return generators, flow * (np.exp(self._decay * self._period) if self._periodic else 0.0)
 
-    def support(self, index: int, directions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def support(
+        self, index: int, directions: NDArray[np.float64], tail: float = _TAIL
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Support function and support points at ``times[index]`` for directions of shape (p, count).
+
+        Earlier periods count until their share falls below `tail`.
 
         Returns
         -------
@@ -114,9 +120,13 @@ class ReachableSets:
         points : ndarray, shape (p, count)
         """
         generators, monodromy = self.at(index)
-        return _support(generators, monodromy, directions)
+        return _support(generators, monodromy, directions, tail)
 
-    def radius(self, index: int, starts: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
+    def norms(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """``||x_e||`` at points xi, shape (p, count)."""
+        return np.asarray(np.linalg.norm(self._edge_form.T @ points, axis=0))
+
+    def radius(self, index: int, starts: NDArray[np.float64], tail: float = _TAIL) -> tuple[float, NDArray[np.float64]]:
         """Largest ``||x_e||`` over the set at ``times[index]``, and its direction, shape (p, 1).
 
         The norm is convex, so its maximum lies at an extreme point: the support point of its own gradient. Power
@@ -126,7 +136,7 @@ class ReachableSets:
         form = self._edge_form @ self._edge_form.T
         directions, best, where = starts, 0.0, starts[:, :1]
         for _ in range(_ITERATIONS):
-            _, points = _support(generators, monodromy, directions)
+            _, points = _support(generators, monodromy, directions, tail)
             squares = np.einsum("ic,ij,jc->c", points, form, points)
             ranked = np.argsort(-squares)
             largest = float(np.sqrt(squares[ranked[0]]))
@@ -143,8 +153,8 @@ class ReachableSets:
             return np.zeros(1, dtype=np.intp)
         cuts = np.append(scenario.edge_weights.breakpoints(0.0, self._period), self._period)
         ends = np.concatenate(([0], np.searchsorted(self._cells.times, cuts * (1 - 1e-12))))
-        inner = [np.linspace(a, b, _INSIDE, endpoint=False).astype(np.intp) for a, b in pairwise(ends)]
-        return np.unique(np.concatenate(inner))
+        step = max(1, round(_APART / self._resolution))
+        return np.unique(np.concatenate([np.arange(a, b, step) for a, b in pairwise(ends)])).astype(np.intp)
 
     def contraction(self) -> float:
         """Largest ``||phi(t + P, t)||`` over the grid of times."""
@@ -168,14 +178,17 @@ class ReachableSets:
 
 
 def _support(
-    generators: NDArray[np.float64], monodromy: NDArray[np.float64], directions: NDArray[np.float64]
+    generators: NDArray[np.float64],
+    monodromy: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    tail: float = _TAIL,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sum over all earlier periods: the m-th one sees the direction ``(monodromy^T)^m b``."""
     history = [directions / np.linalg.norm(directions, axis=0)]
-    while np.linalg.norm(history[-1]) > _TAIL * np.linalg.norm(history[0]):
+    while np.linalg.norm(history[-1]) > tail * np.linalg.norm(history[0]):
         if len(history) > _MOST_CYCLES:
             raise ValueError(
-                f"disagreement forgets less than {_TAIL:g} of itself in {_MOST_CYCLES} periods; "
+                f"disagreement does not vanish to {tail:g} of itself in {_MOST_CYCLES} periods; "
                 "choose beta further below the Floquet rate."
             )
         history.append(monodromy.T @ history[-1])
@@ -184,7 +197,8 @@ def _support(
     block = max(1, _CHUNK // (len(generators) * count))
     for first in range(0, len(history), block):
         chunk = np.concatenate(history[first : first + block], axis=1)
-        along = generators @ chunk
+        # einsum, because a threaded product with so few columns costs more than it gives.
+        along = np.einsum("ri,ic->rc", generators, chunk)
         values += np.abs(along).sum(axis=0).reshape(-1, count).sum(axis=0)
         points = generators.T @ np.sign(along)
         partial += [points[:, k : k + count] for k in range(0, points.shape[1], count)]

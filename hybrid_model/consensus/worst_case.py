@@ -17,6 +17,8 @@ __all__ = ["WorstCase", "starting_directions", "worst_case"]
 _STARTS = 48
 _FEW = 8
 _COARSE = 0.05
+_ROUGH = 1e-3
+_FINALISTS = 3
 _MOST_STEPS = 200
 
 
@@ -65,10 +67,17 @@ def worst_case(
     basis = disagreement_basis(network.agents)
     pairs = np.stack([basis[i - 1] - basis[j - 1] for i, j in network.edges], axis=1)
 
-    trials = [coarse.radius(int(index), starts[:, :_FEW]) for index in indices]
-    widths = np.stack([coarse.support(int(index), pairs)[0] for index in indices])
-    best = int(np.argmax([value for value, _ in trials]))
-    _, direction = coarse.radius(int(indices[best]), starts)
+    # A first look at every time; then from the farthest points found there; then from everywhere at the best times.
+    look = np.hstack((pairs, starts[:, :_FEW]))
+    looks = [coarse.support(int(index), look, _ROUGH) for index in indices]
+    widths = np.stack([values[: pairs.shape[1]] for values, _ in looks])
+    farthest = [points[:, np.argsort(-coarse.norms(points))[:_FEW]] for _, points in looks]
+    rough = [coarse.radius(int(index), points, _ROUGH) for index, points in zip(indices, farthest, strict=True)]
+    finalists = np.argsort([-value for value, _ in rough])[:_FINALISTS].tolist()
+    pool = np.hstack([starts, *(rough[place][1] for place in finalists)])
+    trials = {place: coarse.radius(int(indices[place]), pool) for place in finalists}
+    best = max(finalists, key=lambda place: trials[place][0])
+    direction = trials[best][1]
     times = np.append(coarse.times[indices], period)
     radius, time = _refine(fine, times, best, lambda index: fine.radius(index, direction)[0])
     threshold = scenario.trigger.threshold if threshold is None else threshold
