@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from hybrid_model.consensus.graphs import Edge
 from hybrid_model.consensus.primitive import Primitive
-from hybrid_model.consensus.row_clock import RowClock
+from hybrid_model.consensus.row_clock import RowClock, check_rows
 from hybrid_model.consensus.waveform import ALWAYS, require
 
 __all__ = ["FunctionCarrier", "FunctionWeight", "TimeFunction", "distance_weights", "reliability_weight"]
@@ -90,7 +90,8 @@ class FunctionWeight:
         """Try the function out."""
         if self.period is not None:
             require("period", self.period, self.period > 0, "must be positive")
-        _ = self.carrier.clock
+        if self.kinks:
+            check_rows(self.kinks, self.period, ("kinks", "period"))
         span = self.period if self.period is not None else 100.0
         times = np.linspace(0.0, span, _CHECKS)
         values = self.carrier.value(times)

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from hybrid_model.consensus.gating import Expression
 from hybrid_model.consensus.waveform import require
 
-__all__ = ["RowClock", "row_begin", "row_number", "row_place"]
+__all__ = ["RowClock", "check_rows", "row_begin", "row_number", "row_place"]
 
 
 def row_number(t: Expression, starts: Expression, period: Expression) -> Expression:
@@ -47,6 +47,23 @@ def row_begin(k: Expression, starts: Expression, period: Expression) -> Expressi
     return np.where(np.where(period > 0, 0.0, k) >= rows, np.inf, begin)
 
 
+def check_rows(starts: tuple[float, ...], period: float | None, names: tuple[str, str] = ("starts", "period")) -> None:
+    """Check the times of a table, which messages call by the `names`.
+
+    Raises
+    ------
+    ValueError
+        If there is no row, a time is not finite, the starts do not ascend or the period is too short.
+    """
+    if not starts:
+        raise ValueError(f"{names[0]} is empty; it must list the time at which each row begins.")
+    for number, (start, before) in enumerate(zip(starts, (-math.inf, *starts), strict=False), start=1):
+        require(f"{names[0]}[{number}]", start, start > before, f"must be later than the one before, {before}")
+    if period is not None:
+        span = starts[-1] - starts[0]
+        require(names[1], period, period > span, f"must be longer than {span}, from the first start to the last")
+
+
 @dataclass(frozen=True)
 class RowClock:
     """The same clock for arrays of times.
@@ -69,13 +86,7 @@ class RowClock:
 
     def __post_init__(self) -> None:
         """Check the times."""
-        if not self.starts:
-            raise ValueError("starts is empty; it must list the time at which each row begins.")
-        for number, (start, before) in enumerate(zip(self.starts, (-math.inf, *self.starts), strict=False), start=1):
-            require(f"starts[{number}]", start, start > before, f"must be later than the one before, {before}")
-        if self.period is not None:
-            span = self.starts[-1] - self.starts[0]
-            require("period", self.period, self.period > span, f"must be longer than {span}, from first to last start")
+        check_rows(self.starts, self.period)
 
     @property
     def rows(self) -> int:

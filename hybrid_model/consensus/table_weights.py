@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.carriers import UnitCarrier
-from hybrid_model.consensus.row_clock import RowClock
+from hybrid_model.consensus.row_clock import RowClock, check_rows
 from hybrid_model.consensus.waveform import ALWAYS, require
 
 __all__ = ["LinearCarrier", "PiecewiseWeight", "SampledWeight"]
@@ -39,8 +39,8 @@ class PiecewiseWeight:
 
     def __post_init__(self) -> None:
         """Check the values."""
+        check_rows(self.starts, self.cycle, ("starts", "cycle"))
         _require_values(self.values, len(self.starts), "starts")
-        _ = self.clock
 
     @cached_property
     def clock(self) -> RowClock:
@@ -165,8 +165,8 @@ class SampledWeight:
         """Check the values."""
         if len(self.times) < 2:
             raise ValueError(f"times lists {len(self.times)} samples; there must be at least 2.")
+        check_rows(self.times, None, ("times", ""))
         _require_values(self.values, len(self.times), "times")
-        _ = RowClock(self.times)
 
     def __hash__(self) -> int:
         """Taken once: the samples may be many."""

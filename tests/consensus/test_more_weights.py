@@ -1,0 +1,272 @@
+"""Sine, square, piecewise, sampled and given weights: definitions, quadrature, periods, and the row clock."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+
+from hybrid_model.consensus.carriers import UnitCarrier
+from hybrid_model.consensus.edge_weights import EdgeWeights
+from hybrid_model.consensus.function_weights import FunctionWeight, distance_weights, reliability_weight
+from hybrid_model.consensus.row_clock import RowClock, row_begin, row_number
+from hybrid_model.consensus.switching import NoSwitching, SwitchingSequence
+from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
+from hybrid_model.consensus.wave_weights import SineWeight, SquareWeight
+from hybrid_model.consensus.waveform import Waveform
+
+rates = st.floats(0.05, 20.0)
+phases = st.floats(-20.0, 20.0)
+levels = st.floats(0.0, 5.0)
+times = st.floats(-60.0, 60.0)
+gaps = st.floats(0.01, 3.0)
+
+
+@st.composite
+def starts(draw, least=1):
+    steps = draw(st.lists(gaps, min_size=least, max_size=7))
+    return tuple(np.cumsum([draw(st.floats(-5.0, 5.0)), *steps])[:-1].tolist()), steps[-1]
+
+
+@st.composite
+def piecewise(draw):
+    begins, rest = draw(starts())
+    values = draw(st.lists(levels, min_size=len(begins), max_size=len(begins)))
+    cycle = begins[-1] - begins[0] + rest if draw(st.booleans()) else None
+    return PiecewiseWeight(begins, tuple(values), cycle)
+
+
+@st.composite
+def sampled(draw):
+    samples, _ = draw(starts(least=2))
+    values = draw(st.lists(levels, min_size=len(samples), max_size=len(samples)))
+    return SampledWeight(samples, tuple(values), draw(st.booleans()))
+
+
+waveforms = st.one_of(
+    st.builds(SineWeight, levels, st.floats(0.0, 1.0), rates, phases),
+    st.builds(
+        SquareWeight, levels, levels, rates, st.one_of(st.floats(0.5, 99.5), st.sampled_from([0.0, 100.0])), phases
+    ),
+    piecewise(),
+    sampled(),
+    st.sampled_from(
+        [
+            FunctionWeight(lambda t: np.exp(np.sin(t)), period=2 * math.pi),
+            FunctionWeight(lambda t: np.abs(np.sin(2 * t)), (0.0,), math.pi / 2),
+            FunctionWeight(lambda t: 1 / (1 + t**2)),
+            FunctionWeight(lambda t: np.maximum(1 - np.abs(t - 3), 0.0), (2.0, 3.0, 4.0)),
+        ]
+    ),
+)
+
+
+def by_quadrature(wave, t0, t1):
+    """Integral of the values, piece by piece between the breakpoints."""
+    cuts = [t0, *wave.breakpoints(t0, t1), t1]
+    return sum(quad(inside, a, b, args=(wave, a, b), epsabs=1e-11, limit=200)[0] for a, b in pairwise(cuts))
+
+
+def inside(t, wave, a, b):
+    """The value at t or, at the ends of the piece, just inside it: a jump belongs to the neighbour."""
+    return float(wave.value(min(max(t, a), math.nextafter(b, a))))
+
+
+class TestEveryKind:
+    @given(wave=waveforms, t=times)
+    @settings(max_examples=200)
+    def test_is_a_waveform_whose_value_is_amplitude_times_carrier(self, wave, t):
+        assert isinstance(wave, Waveform)
+        product = float(wave.amplitude(t)) * float(wave.carrier.value(t))
+        assert float(wave.value(t)) == pytest.approx(product, rel=1e-15)
+        assert float(wave.value(t)) >= 0
+
+    @given(wave=waveforms, t0=st.floats(-12, 12), span=st.floats(0.0, 6.0))
+    @settings(max_examples=150, deadline=None)
+    def test_integral_agrees_with_quadrature(self, wave, t0, span):
+        # Quadrature to 1e-11 on each of up to some 600 pieces.
+        assert float(wave.integral(t0, t0 + span)) == pytest.approx(by_quadrature(wave, t0, t0 + span), abs=1e-8)
+
+    @given(wave=waveforms, t=st.lists(times, min_size=3, max_size=3))
+    @settings(max_examples=150)
+    def test_integral_is_additive_and_antisymmetric(self, wave, t):
+        a, b, c = sorted(t)
+        whole, left, right = (float(wave.integral(*pair)) for pair in ((a, c), (a, b), (b, c)))
+        assert whole == pytest.approx(left + right, abs=1e-9)
+        assert float(wave.integral(c, a)) == pytest.approx(-whole, abs=1e-9)
+        assert left >= -1e-11
+
+    @given(wave=waveforms, t=times, cycles=st.integers(1, 4))
+    @settings(max_examples=200)
+    def test_period_repeats_values_integrals_and_breakpoints(self, wave, t, cycles):
+        period = wave.period
+        if period is None:
+            return
+        span = cycles * (period or 1.0)
+        assert float(wave.integral(t, t + span)) == pytest.approx(
+            cycles * float(wave.integral(0.0, period or 1.0)), abs=1e-8
+        )
+        if period > 0:
+            assert len(wave.breakpoints(t, t + period)) <= len(wave.breakpoints(0.0, period)) + 1
+            near = wave.breakpoints(t - 1e-9, t + 1e-9)
+            if near.size == 0:  # at a breakpoint itself the two computations may round to different sides
+                assert float(wave.value(t + period)) == pytest.approx(float(wave.value(t)), abs=1e-6)
+
+    @given(wave=waveforms, t=times)
+    @settings(max_examples=150)
+    def test_nothing_jumps_between_breakpoints(self, wave, t):
+        cuts = np.array([t, *wave.breakpoints(t, t + 2.0), t + 2.0])
+        assert np.all(np.diff(cuts) > 0)
+        for a, b in pairwise(cuts):
+            assert np.ptp(wave.amplitude(np.linspace(a, b, 9)[1:-1])) == 0
+
+    @given(wave=waveforms)
+    @settings(max_examples=60)
+    def test_arrays_equal_scalars(self, wave):
+        begins, ends = np.linspace(-3, 4, 7), np.linspace(5, 6, 7)
+        scalars = [float(wave.integral(a, b)) for a, b in zip(begins, ends, strict=True)]
+        np.testing.assert_allclose(wave.integral(begins, ends), scalars, atol=1e-10)
+        assert wave.integral(begins[:, None], ends).shape == (7, 7)
+        np.testing.assert_array_equal(wave.value(begins), [float(wave.value(t)) for t in begins])
+
+
+class TestByHand:
+    def test_sine(self):
+        wave = SineWeight(2.0, 0.5, 3.0, 0.7)
+        assert float(wave.value(1.1)) == pytest.approx(2 + math.sin(3 * 1.1 - 0.7))
+        assert wave.period == pytest.approx(2 * math.pi / 3)
+        assert SineWeight(2.0, 0.0, 3.0).period == 0.0
+
+    def test_square(self):
+        wave = SquareWeight(3.0, 1.0, math.pi, 25.0)  # period 2 s, high for half a second
+        np.testing.assert_array_equal(wave.value([0.0, 0.49, 0.5, 1.99, 2.0]), [3.0, 3.0, 1.0, 1.0, 3.0])
+        assert float(wave.integral(0.0, 3.0)) == pytest.approx(3 + 2 * (0.5 + 0.5))
+        assert wave.period == 2.0
+        assert SquareWeight(1.0, 1.0, 2.0, 25.0).period == 0.0
+
+    def test_piecewise(self):
+        once = PiecewiseWeight((1.0, 2.0, 4.0), (5.0, 0.0, 2.0))
+        np.testing.assert_array_equal(once.value([-9.0, 1.9, 2.0, 3.9, 4.0, 99.0]), [5.0, 5.0, 0.0, 0.0, 2.0, 2.0])
+        assert float(once.integral(0.0, 6.0)) == 5 * 2 + 2 * 2
+        assert once.period is None
+        again = PiecewiseWeight((1.0, 2.0, 4.0), (5.0, 0.0, 2.0), cycle=4.0)
+        np.testing.assert_array_equal(again.value([0.5, 1.0, 5.0, 6.5, 8.9]), [2.0, 5.0, 5.0, 0.0, 2.0])
+        assert float(again.integral(1.0, 401.0)) == pytest.approx(100 * (5 + 0 + 2), rel=1e-13)
+        np.testing.assert_array_equal(again.breakpoints(0.0, 6.0), [1.0, 2.0, 4.0, 5.0])
+
+    def test_samples_that_repeat_jump_back_and_others_stay(self):
+        ramp = SampledWeight((0.0, 1.0, 3.0), (0.0, 2.0, 4.0), repeat=True)
+        np.testing.assert_allclose(ramp.value([0.5, 2.0, 3.0, 3.5, -0.5]), [1.0, 3.0, 0.0, 1.0, 3.5])
+        assert ramp.period == 3.0
+        assert float(ramp.integral(0.0, 30.0)) == pytest.approx(10 * (1 + 6))
+        once = SampledWeight((0.0, 1.0, 3.0), (1.0, 2.0, 4.0))
+        np.testing.assert_allclose(once.value([-5.0, 3.0, 50.0]), [1.0, 4.0, 4.0])
+        assert once.domain == (0.0, 3.0)
+
+    def test_proportional_samples_share_their_carrier(self):
+        shape, double = (0.0, 1.0, 2.0), (0.0, 2.0, 4.0)
+        weights = EdgeWeights(tuple(SampledWeight((0.0, 1.0, 3.0), v) for v in (shape, double)), NoSwitching(2))
+        piece = weights.pieces(0.0, 3.0)[0]
+        assert piece.shared_carrier is not None
+        np.testing.assert_array_equal(piece.amplitudes, [2.0, 4.0])
+        assert EdgeWeights((SquareWeight(1.0, 0.2, 1.0, 30.0),), NoSwitching(1)).pieces(0, 1)[0].carriers == (
+            UnitCarrier(),
+        )
+
+    def test_reliability(self):
+        wave = reliability_weight(lambda r: 2 * r**2, lambda t: 0.5 + 0.5 * np.cos(t), period=2 * math.pi)
+        # The mean of (1 + cos)^2/2 is 3/4.
+        assert float(wave.integral(0.0, 2 * math.pi)) == pytest.approx(2 * math.pi * 0.75, rel=1e-13)
+
+    def test_distance(self):
+        # Agent 1 rests, agent 2 swings from 0 to 2; the radio reaches 1.5, with a kink where d = 1.5.
+        still, moving = (lambda t: (0.0 * t,)), (lambda t: (1 - np.cos(t),))
+        (wave,) = distance_weights(
+            [(1, 2)], [still, moving], lambda d: np.maximum(1.5 - d, 0.0), bends=[1.5], horizon=9.0, period=2 * math.pi
+        )
+        out = math.acos(-0.5)
+        np.testing.assert_allclose(wave.kinks, [out, 2 * math.pi - out], rtol=1e-12)
+        assert float(wave.value(math.pi)) == 0.0
+        expected = 2 * (0.5 * out + math.sin(out))  # 1.5 - 1 + cos t
+        assert float(wave.integral(0.0, 2 * math.pi)) == pytest.approx(expected, rel=1e-12)
+
+    def test_integral_through_an_unannounced_kink_is_refined(self):
+        wave = FunctionWeight(lambda t: np.abs(t - 1 / 3))
+        assert float(wave.integral(0.0, 1.0)) == pytest.approx((1 / 9 + 4 / 9) / 2, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: SineWeight(-1.0, 0.5, 1.0), "mean is -1.0; it must not be negative"),
+        (lambda: SineWeight(1.0, 1.5, 1.0), "depth is 1.5; it must lie between 0 and 1, else the weight is negative"),
+        (lambda: SineWeight(1.0, 0.5, 0.0), "rate is 0.0; it must be positive"),
+        (lambda: SquareWeight(1.0, -0.5, 1.0, 20.0), "low is -0.5; it must not be negative"),
+        (lambda: SquareWeight(1.0, 0.5, 1.0, 120.0), "duty_percent is 120.0; it must lie between 0 and 100"),
+        (lambda: PiecewiseWeight((), ()), "starts is empty"),
+        (lambda: PiecewiseWeight((0.0, 1.0), (1.0,)), "values lists 1 numbers for 2 starts; give one for each"),
+        (lambda: PiecewiseWeight((0.0, 0.0), (1.0, 2.0)), r"starts\[2\] is 0.0; it must be later than the one before"),
+        (lambda: PiecewiseWeight((0.0, 2.0), (1.0, 2.0), 2.0), "cycle is 2.0; it must be longer than 2.0"),
+        (lambda: PiecewiseWeight((0.0,), (-1.0,)), r"values\[1\] is -1.0; it must not be negative"),
+        (lambda: SampledWeight((0.0,), (1.0,)), "times lists 1 samples; there must be at least 2"),
+        (lambda: SampledWeight((0.0, math.nan), (1.0, 1.0)), r"times\[2\] is nan; it must be a finite number"),
+        (lambda: FunctionWeight(lambda t: np.cos(t)), "the weight at t = .* must not be negative"),
+        (
+            lambda: FunctionWeight(lambda t: t, period=1.0),
+            "period is 1.0, but the weight is 0 at t = 0 and 1 one period",
+        ),
+        (lambda: FunctionWeight(lambda t: t * t, period=-1.0), "period is -1.0; it must be positive"),
+    ],
+)
+def test_bad_values_are_named(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+class TestRowClock:
+    @given(table=starts(), k=st.integers(-3000, 3000), repeats=st.booleans())
+    @settings(max_examples=300)
+    def test_a_computed_beginning_lies_in_its_row(self, table, k, repeats):
+        begins, rest = table
+        clock = RowClock(begins, begins[-1] - begins[0] + rest if repeats else None)
+        number = k if repeats else k % clock.rows
+        begin = float(clock.begin(number))
+        assert int(clock.number(begin)) == number
+        if repeats or number > 0:
+            assert int(clock.number(math.nextafter(begin, -math.inf))) == number - 1
+        # The form that is traced gives the same bits.
+        period = clock.period or 0.0
+        assert row_begin(number, np.array(begins), period) == begin
+        assert row_number(begin, np.array(begins), period) == number
+
+    @given(table=starts(), t=times, repeats=st.booleans())
+    @settings(max_examples=300)
+    def test_both_forms_find_the_same_row(self, table, t, repeats):
+        begins, rest = table
+        clock = RowClock(begins, begins[-1] - begins[0] + rest if repeats else None)
+        number = int(clock.number(t))
+        assert row_number(t, np.array(begins), clock.period or 0.0) == number
+        assert t < clock.begin(number + 1)
+        assert t >= clock.begin(number) or (not repeats and number == 0)
+
+    def test_behind_the_last_row_there_is_none(self):
+        clock = RowClock((0.0, 1.0))
+        assert float(clock.begin(2)) == math.inf
+        assert row_begin(2, np.array([0.0, 1.0]), 0.0) == math.inf
+        assert clock.breakpoints(0.0, 100.0).tolist() == [1.0]
+
+
+def test_edge_weights_follow_a_sequence():
+    wave = SineWeight(1.0, 0.8, 2.0)
+    sequence = SwitchingSequence((0.5, 1.25), ((1,), (2,)), 2, repeat=True)
+    weights = EdgeWeights((wave, wave), sequence)
+    cuts = [0.0, 0.5, 1.75, 2.25, 3.0]
+    parts = [float(wave.integral(a, b)) for a, b in pairwise(cuts)]
+    np.testing.assert_allclose(weights.integral(0.0, 3.0), [parts[0] + parts[2], parts[1] + parts[3]], rtol=1e-13)
+    primitive = weights.primitive(0.0, 3.0)
+    np.testing.assert_allclose(
+        primitive(np.array([0.0, 1.1, 3.0])), [weights.integral(0.0, t) for t in (0.0, 1.1, 3.0)], atol=1e-14
+    )
