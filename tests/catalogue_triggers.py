@@ -52,30 +52,24 @@ def trigger_cases(case):
     """All cases by name, made by the catalogue's class; no event lies on one of the output points."""
     found = {}
     heard = {"neighbours[1]": ((2.0, 1.3), (7.5, 0.9)), "neighbours[2]": ((3.0, 0.6), (6.0, 1.0))}
-    for law in LAWS:
-        scenario = law_scenario(law)
-        found[f"paper_{law}"] = case(closed_loop(scenario), 9.07)
-        found[f"agent2_{law}"] = case(scenario_agents(scenario)["agent2"], 9.07, heard)
-    found["paper_continuous"] = case(
-        closed_loop(replace(load_scenario("paper-a"), trigger=Trigger(TriggerKind.CONTINUOUS))), 9.07
-    )
-    found["absolute_self_triggered"] = case(closed_loop(absolute_self_triggered()), 9.07)
     ring = read_scenario(RING)
-    ring_self = replace(ring, trigger=Trigger(TriggerKind.SELF_TRIGGERED, 0.1, 0.2))
-    found["ring_self_triggered"] = case(closed_loop(ring_self), 5.03)
+    for law, trigger in LAWS.items():
+        found[f"ring_{law}"] = case(closed_loop(replace(ring, trigger=trigger)), 5.03)
+        found[f"agent2_{law}"] = case(scenario_agents(law_scenario(law))["agent2"], 9.07, heard)
+    found["ring_continuous"] = case(closed_loop(replace(ring, trigger=Trigger(TriggerKind.CONTINUOUS))), 5.03)
+    found["absolute_self_triggered"] = case(scenario_agents(absolute_self_triggered())["agent2"], 9.07, heard)
     for name, channel in CHANNELS.items():
-        scenario = replace(ring, channel=channel)
-        found[f"ring_{name}"] = case(closed_loop(scenario), 5.03)
-        found[f"ring_agent1_{name}"] = case(
-            scenario_agents(scenario)["agent1"],
-            5.03,
-            {
-                "neighbours[1]": ((0.3, 0.1), (0.9, -0.2), (1.4, 0.3), (2.2, 0.1)),
-                "sent[1]": ((0.3, 1.0), (0.9, 2.0), (1.4, 3.0), (2.2, 4.0)),
-                "neighbours[2]": ((0.3, 0.0), (1.7, 0.7)),
-                "sent[2]": ((0.3, 1.0), (1.7, 2.0)),
-            },
-        )
+        found[f"ring_{name}"] = case(closed_loop(replace(ring, channel=channel)), 5.03)
+    found["ring_agent1_loss"] = case(
+        scenario_agents(replace(ring, channel=CHANNELS["loss"]))["agent1"],
+        5.03,
+        {
+            "neighbours[1]": ((0.3, 0.1), (0.9, -0.2), (1.4, 0.3), (2.2, 0.1)),
+            "sent[1]": ((0.3, 1.0), (0.9, 2.0), (1.4, 3.0), (2.2, 4.0)),
+            "neighbours[2]": ((0.3, 0.0), (1.7, 0.7)),
+            "sent[2]": ((0.3, 1.0), (1.7, 2.0)),
+        },
+    )
     found["double_integrators"] = case(double_integrator_loop(ring, VELOCITIES, 1.5), 5.03)
     found["double_integrator_agent"] = case(
         double_integrator_agents(ring, VELOCITIES, 1.5)["agent1"],
