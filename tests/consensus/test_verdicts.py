@@ -59,9 +59,8 @@ class TestRow0aModelsAndCoordinates:
             weights = random.uniform(0, 2, len(tree.edges))
             W = np.diag(weights[tree.order])
             x = random.standard_normal(n)
-            np.testing.assert_allclose(
-                weighted_laplacian(n, tree.edges, weights), D @ np.diag(weights) @ D.T, atol=1e-12
-            )
+            L = weighted_laplacian(n, tree.edges, weights)
+            np.testing.assert_allclose(L, D @ np.diag(weights) @ D.T, atol=1e-12)
             np.testing.assert_allclose(tree.incidence_cycle, tree.incidence_tree @ tree.Z, atol=1e-12)
             np.testing.assert_allclose(D[:, tree.order], tree.incidence_tree @ tree.R, atol=1e-12)
             # Both sides of the dynamics of Upsilon: psi x' = -k Lambda M Upsilon.
@@ -307,7 +306,7 @@ class TestRowsEZeno:
         assert found.actual < 0.1 * found.printed
 
     def test_but_every_run_has_finitely_many_events(self):
-        # Two agents, rate 2/s, beta = 3/s: gaps fall like e^{-(beta - rate) t}, so the events of a run are finitely many.
+        # Two agents, rate 2/s, beta = 3/s: gaps fall like e^{-(beta - rate) t}, so events up to any time are finite.
         scenario = read_scenario(
             {
                 "name": "fast threshold",

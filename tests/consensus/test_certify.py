@@ -1,0 +1,364 @@
+"""Certificates of whole scenarios: published numbers, exact answers, order, and what is said if a hypothesis fails."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oracles.bang_bang import reached
+from scipy.integrate import quad
+from scipy.linalg import expm
+
+import hybrid_model as hm
+from fmu.compiled import compiled
+from hybrid_model.consensus.analysis import analyse
+from hybrid_model.consensus.bounds import Bounds
+from hybrid_model.consensus.certificates import BoundForm
+from hybrid_model.consensus.certify import certify
+from hybrid_model.consensus.corollary import bottleneck_weight, repaired_corollary, tree_connectivity
+from hybrid_model.consensus.floquet import transition_matrix
+from hybrid_model.consensus.flow_cells import flow_cells
+from hybrid_model.consensus.graphs import disagreement_basis, weighted_laplacian
+from hybrid_model.consensus.network import closed_loop
+from hybrid_model.consensus.reachable_sets import ReachableSets
+from hybrid_model.consensus.scenario import load_scenario, read_scenario
+from hybrid_model.consensus.trees import exciting_trees, tree_radii
+from hybrid_model.consensus.worst_case import worst_case
+
+
+def network(edges, weights, *, agents=4, trigger=None, initial=None, stop_time=5.0, **more):
+    return read_scenario(
+        {
+            "name": "test",
+            "stop_time": stop_time,
+            "network": {
+                "agents": agents,
+                "edges": edges,
+                "initial": initial or np.linspace(1.0, -1.0, agents).tolist(),
+            },
+            "weights": weights,
+            "trigger": trigger or {"kind": "static", "threshold": 0.3},
+            **more,
+        }
+    )
+
+
+def run_of(scenario):
+    return hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+
+
+def coarse(scenario, arc=None):
+    """Certificates whose exact radius has four digits: quicker, for tests that need no more."""
+    return certify(scenario, arc, resolution=0.05)
+
+
+PAIR = {"edges": [[1, 2]], "weights": {"kind": "constant", "value": 1.5}, "agents": 2}
+PATH = {"edges": [[1, 2], [2, 3], [3, 4]], "weights": {"kind": "constant", "value": [1.0, 0.5, 2.0]}}
+
+
+@pytest.fixture(scope="module")
+def paper():
+    """Certificates of the paper's example with both triggers."""
+    scenarios = {name: load_scenario(name) for name in ("paper-a-static", "paper-a")}
+    return {name: certify(scenario, run_of(scenario)) for name, scenario in scenarios.items()}
+
+
+class TestPublishedNumbersOfScenarioA:
+    @pytest.mark.parametrize("name", ["paper-a-static", "paper-a"])
+    def test_rates(self, paper, name):
+        rates = paper[name].as_dict()["rate"]
+        assert rates["printed"] == pytest.approx(4.8108e-4, abs=5e-9)
+        assert rates["valid"] == pytest.approx(1.2112e-4, abs=5e-9)
+        assert rates["improved"] == pytest.approx(9.5818e-3, abs=5e-8)
+        assert rates["floquet"] == pytest.approx(0.468778, abs=5e-7)
+
+    @pytest.mark.parametrize("name", ["paper-a-static", "paper-a"])
+    def test_excitation(self, paper, name):
+        found = paper[name].as_dict()
+        assert found["pe"]["mu1"] == pytest.approx(1.256637, abs=5e-7)
+        assert found["pe"]["mu2"] == pytest.approx(2.473796, abs=5e-7)
+        assert found["pe"]["T"] == pytest.approx(2 * math.pi, rel=1e-12)
+        text = " ".join(found["notes"])
+        for number in ("1.577391", "5.725561", "5.764946", "2.990276", "8.052068", "8.441277", "9.3453"):
+            assert number in text
+        for number in ("0.0525799", "0.0262069", "0.000292459"):
+            assert number in text
+
+    def test_radius_and_gap_with_the_static_trigger(self, paper):
+        found = paper["paper-a-static"].as_dict()
+        assert found["radius"]["exact"] == pytest.approx(2.26459, abs=5e-6)
+        assert found["radius"]["energy"] == pytest.approx(4.3633, abs=5e-5)
+        assert found["min_gap"]["printed"] == pytest.approx(5.93e-4, abs=5e-7)
+        assert found["min_gap"]["observed"] == pytest.approx(0.106236, abs=5e-7 + 2e-8)  # less the time tolerance
+
+    def test_the_dynamic_trigger_of_the_paper(self, paper):
+        found = paper["paper-a"].as_dict()
+        assert found["min_gap"]["observed"] == pytest.approx(0.103836, abs=5e-7 + 2e-8)
+        assert found["radius"]["printed"] is None
+        assert found["radius"]["valid"] is None
+        assert found["min_gap"]["printed"] is None
+        notes = " ".join(found["notes"])
+        assert "Hypothesis 'beta below the printed rate' fails: beta is 0.06/s, the printed rate 0.000481081/s" in notes
+        # With the threshold held constant the numbers of the static trigger are said as well.
+        assert "energy 4.36331, exact 2.26459" in notes
+
+    @pytest.mark.parametrize("name", ["paper-a-static", "paper-a"])
+    def test_order(self, paper, name):
+        found = paper[name].as_dict()
+        radius, gap, rate = found["radius"], found["min_gap"], found["rate"]
+        radii = [radius[form] for form in ("observed", "exact", "energy", "valid") if radius[form] is not None]
+        gaps = [gap[form] for form in ("valid", "improved", "observed") if gap[form] is not None]
+        assert radii == sorted(radii)
+        assert gaps == sorted(gaps)
+        assert rate["valid"] < rate["improved"] < rate["floquet"]
+
+    def test_the_printed_gap_says_that_it_is_refuted(self, paper):
+        notes = " ".join(paper["paper-a-static"].notes)
+        assert "The printed minimum gap 0.000593288 s is not one" in notes
+        assert "tends to 2.03163e-06 s" in notes
+
+    def test_json_has_the_documented_keys(self, paper):
+        found = json.loads(json.dumps(paper["paper-a"].as_dict()))
+        assert set(found) == {"rate", "radius", "min_gap", "pe", "notes"}
+        assert set(found["rate"]) == {"printed", "valid", "improved", "floquet"}
+        assert set(found["radius"]) == {"printed", "valid", "energy", "exact", "observed"}
+        assert set(found["min_gap"]) == {"printed", "valid", "improved", "observed"}
+        assert set(found["pe"]) == {"mu1", "mu2", "T"}
+
+    def test_every_value_names_unit_source_and_hypotheses(self, paper):
+        known = {hypothesis.name for hypothesis in paper["paper-a"].hypotheses}
+        for value in paper["paper-a"].values:
+            assert value.unit
+            assert value.source
+            assert set(value.needs) <= known
+
+
+class TestExactWorstCase:
+    @pytest.mark.parametrize("decay", [0.0, 0.8, 2.0])
+    def test_two_agents_by_hand(self, decay):
+        # int k 2w 2c e^{-(2kw - beta)s} ds = 2c 2w/(2w - beta).
+        scenario = network(**PAIR)
+        found = worst_case(scenario, 1.0, decay)
+        expected = 2 * 0.3 * 3.0 / (3.0 - decay)
+        # Each cell takes the mean of the exponential; the resolution of 0.01 leaves some 1e-6.
+        assert found.radius == pytest.approx(expected, rel=1e-5)
+        assert found.pairs[1, 2] == pytest.approx(expected, rel=1e-5)
+
+    def test_pairs_with_constant_weights_by_quadrature(self):
+        scenario = network(**PATH)
+        found = worst_case(scenario, 3.0, 0.1)
+        L = weighted_laplacian(4, scenario.network.edges, [1.0, 0.5, 2.0])
+        for (i, j), width in found.pairs.items():
+            b = np.eye(4)[i - 1] - np.eye(4)[j - 1]
+            # Split where the sign of a component may change; a component has at most two such places here.
+            total = sum(
+                quad(lambda s: np.abs(L @ expm(-L * s) @ b).sum() * math.exp(0.1 * s), a, a + 0.25, epsabs=1e-9)[0]  # noqa: B023
+                for a in np.arange(0.0, 60.0, 0.25)
+            )
+            assert width == pytest.approx(0.3 * total, rel=2e-5)
+
+    @pytest.mark.parametrize("decay", [0.0, 0.06])
+    def test_errors_exist_that_reach_the_radius_of_the_paper(self, decay):
+        scenario = load_scenario("paper-a")
+        sets = ReachableSets(scenario, 2 * np.pi, decay, 0.02)
+        found = worst_case(scenario, 2 * np.pi, decay, 0.02)
+        index = int(np.argmin(np.abs(sets.times - found.time)))
+        random = np.random.default_rng(1).standard_normal((3, 30))
+        value, direction = sets.radius(index, random)
+        assert 0.5 * value <= found.radius * (1 + 1e-6)
+        xi = reached(scenario, direction[:, 0], float(sets.times[index]), 8 * np.pi, decay)
+        # n = 4 and the complete graph: ||x_e|| = 2 ||xi||. The oracle's weights are constant on 60 steps a piece.
+        assert 0.5 * 2 * np.linalg.norm(xi) == pytest.approx(0.5 * value, rel=2e-3)
+        assert 0.5 * 2 * np.linalg.norm(xi) <= found.radius * 1.002
+
+    def test_finer_grids_change_little_and_never_lower_the_value(self):
+        scenario = load_scenario("paper-a-static")
+        coarse, fine = (worst_case(scenario, 2 * np.pi, 0.0, r).radius for r in (0.05, 0.01))
+        assert coarse <= fine * (1 + 1e-7)
+        assert fine == pytest.approx(coarse, rel=1e-4)
+
+    def test_random_errors_stay_inside(self):
+        """Random bang-bang errors of random length never leave the set."""
+        scenario = network(
+            [[1, 2], [2, 3], [3, 4], [4, 1]],
+            {"kind": "constant", "value": 1.0},
+            switching={"dwell": 0.5, "active": [[1, 2], [3, 4]]},
+        )
+        radius = worst_case(scenario, 1.0, 0.0).radius / 0.3
+        U = disagreement_basis(4)
+        cells = flow_cells(scenario, 0.0, 1.0, 0.1)
+        random = np.random.default_rng(2)
+        D = np.stack([np.eye(4)[j - 1] - np.eye(4)[i - 1] for i, j in scenario.network.edges], axis=1)
+        for _ in range(20):
+            xi, hold = np.zeros(3), int(random.integers(1, 12))
+            for k in range(40 * len(cells.flows)):
+                if k % hold == 0:
+                    error = random.choice([-1.0, 1.0], 4)
+                fixed = -(U.T @ error)
+                xi = fixed + cells.flows[k % len(cells.flows)] @ (xi - fixed)
+                assert np.linalg.norm(D.T @ U @ xi) <= radius * (1 + 1e-9)
+
+
+class TestFlowCells:
+    def test_product_is_the_transition_matrix(self):
+        for name in ("paper-a",):
+            scenario = load_scenario(name)
+            np.testing.assert_allclose(
+                flow_cells(scenario, 0.0, 7.0, 0.05).product(), transition_matrix(scenario, 0.0, 7.0), atol=1e-13
+            )
+
+    def test_different_carriers_by_magnus_steps(self):
+        weights = {
+            "kind": "gated-sine",
+            "gate_rate": 2.0,
+            "sine_rate": [1.0, 2.0, 3.0],
+            "duty_percent": [60.0, 80.0, 100.0],
+        }
+        scenario = network([[1, 2], [2, 3], [3, 4]], weights)
+        # transition_matrix integrates such pieces to a relative tolerance of 1e-12.
+        np.testing.assert_allclose(
+            flow_cells(scenario, 0.0, 3.0, 0.02).product(), transition_matrix(scenario, 0.0, 3.0), atol=1e-9
+        )
+
+
+class TestTreesAndCorollary:
+    def test_the_number_of_exciting_trees(self):
+        # The cycle on four agents has four spanning trees.
+        assert len(list(exciting_trees(analyse(load_scenario("paper-a"))))) == 4
+
+    def test_every_tree_bounds_the_exact_radius(self):
+        analysis = analyse(load_scenario("paper-a-static"))
+        exact = Bounds(analysis).exact_radius
+        for form in BoundForm:
+            for found in tree_radii(analysis, form):
+                assert found.radius >= exact
+
+    @pytest.mark.parametrize("dwell", [math.pi / 2, math.pi, 2 * math.pi])
+    def test_repaired_corollary_on_the_example(self, dwell):
+        scenario = load_scenario("paper-a")
+        scenario = replace(scenario, switching=replace(scenario.switching, dwell=dwell))
+        found = repaired_corollary(scenario)
+        assert 0 < found.guaranteed <= found.exact
+        assert found.window == pytest.approx(2 * max(np.diff(found.cuts)))
+
+    def test_repaired_corollary_on_random_switching(self):
+        random = np.random.default_rng(409)
+        for _ in range(60):
+            active = [random.choice(6, random.integers(1, 4), replace=False) + 1 for _ in range(3)]
+            scenario = network(
+                [[1, 2], [2, 3], [3, 4], [4, 1], [1, 3], [2, 4]],
+                {"kind": "constant", "value": random.uniform(0.2, 2, 6).tolist()},
+                switching={"dwell": 0.5, "active": [row.tolist() for row in active]},
+            )
+            if not scenario.edge_weights.period or bottleneck_weight(scenario, 0.0, scenario.edge_weights.period) == 0:
+                with pytest.raises(ValueError, match=r"repaired corollary|not connected"):
+                    repaired_corollary(scenario)
+                continue
+            found = repaired_corollary(scenario)
+            assert 0 < found.guaranteed <= found.exact * (1 + 1e-12)
+
+    def test_least_connectivity_of_trees(self):
+        assert tree_connectivity(4) == pytest.approx(2 - math.sqrt(2))
+
+
+class TestHypothesesThatFail:
+    def test_a_disconnected_union_says_which_parts_and_certifies_each(self):
+        scenario = network([[1, 2], [3, 4]], {"kind": "constant", "value": 1.0})
+        found = certify(scenario, run_of(scenario))
+        assert found.value("rate", "floquet") is None
+        assert found.value("radius", "exact") is None
+        assert "falls into the parts {1, 2} and {3, 4}" in found.notes[0]
+        assert "Agents 1, 2 by themselves: Floquet rate 2 1/s" in found.notes[1]
+        assert "exact radius over their own edges 0.6 units of x" in found.notes[1]
+        gap = found.value("min_gap", "improved")
+        assert gap is not None
+        assert gap <= found.value("min_gap", "observed")
+        assert [h.name for h in found.hypotheses if not h.holds] == ["connected union"]
+
+    def test_an_agent_alone(self):
+        scenario = network([[1, 2], [2, 3]], {"kind": "constant", "value": [1.0, 0.0]}, agents=3)
+        assert "Agent 3 never moves" in " ".join(certify(scenario).notes)
+
+    def test_switching_whose_union_is_not_connected(self):
+        scenario = network(
+            [[1, 2], [2, 3], [3, 4]],
+            {"kind": "constant", "value": 1.0},
+            switching={"dwell": 0.5, "active": [[1], [3]]},
+        )
+        found = certify(scenario)
+        assert "over 1 s falls into the parts {1, 2} and {3, 4}" in found.notes[0]
+        # Half of the time with rate 2.
+        assert "Floquet rate 1 1/s" in found.notes[1]
+
+    def test_beta_above_every_rate(self):
+        scenario = network(**PAIR, trigger={"kind": "dynamic", "threshold": 0.3, "decay": 4.0}, stop_time=1.5)
+        found = certify(scenario, run_of(scenario))
+        failed = [h.name for h in found.hypotheses if not h.holds]
+        assert failed == ["beta below the printed rate", "beta below the valid rate", "beta below the Floquet rate"]
+        assert found.value("radius", "exact") is None
+        assert found.value("min_gap", "improved") is None
+        assert found.value("rate", "floquet") == pytest.approx(3.0)
+        note = next(n for n in found.notes if "'beta below the Floquet rate'" in n)
+        assert "Consensus is still reached" in note
+        least = Bounds(analyse(scenario)).gap_until(scenario.stop_time)
+        assert f"closer than {least:.6g} s" in note
+        assert least <= found.value("min_gap", "observed")
+
+    def test_beta_between_the_valid_and_the_floquet_rate(self):
+        scenario = network(**PATH, trigger={"kind": "dynamic", "threshold": 0.3, "decay": 0.3})
+        found = coarse(scenario)
+        assert found.value("rate", "valid") < 0.3 < found.value("rate", "floquet")
+        assert found.value("radius", "valid") is None
+        assert found.value("radius", "exact") <= found.value("radius", "energy")
+
+    def test_beta_equal_to_the_valid_rate(self):
+        rate = coarse(network(**PATH)).value("rate", "valid")
+        scenario = network(**PATH, trigger={"kind": "dynamic", "threshold": 0.3, "decay": rate})
+        assert "(1 + t/" in " ".join(coarse(scenario).notes)
+
+    def test_an_unexciting_tree_leaves_the_tree_free_forms(self):
+        from hybrid_model.consensus.spanning_trees import TreePartition
+
+        scenario = load_scenario("paper-a-static")
+        tree = TreePartition(4, scenario.network.underlying_edges, (1, 2, 6))
+        found = certify(scenario, tree=tree, resolution=0.05)
+        assert found.value("rate", "printed") is None
+        assert found.value("radius", "printed") is None
+        assert found.value("rate", "improved") == pytest.approx(9.5818e-3, abs=5e-8)
+        assert "in some window an edge of the tree carries no weight" in " ".join(found.notes)
+
+
+class TestOtherTriggers:
+    def test_mixed_threshold_by_linearity(self):
+        base = network(**PATH, trigger={"kind": "static", "threshold": 0.2})
+        mixed = network(**PATH, trigger={"kind": "mixed", "offset": 0.2, "threshold": 0.5, "decay": 0.1})
+        first, second = coarse(base), coarse(mixed, run_of(mixed))
+        assert second.value("radius", "exact") == pytest.approx(first.value("radius", "exact"), rel=1e-12)
+        assert second.value("radius", "printed") is None
+        assert second.value("min_gap", "improved") <= second.value("min_gap", "observed")
+
+    def test_self_triggered_runs_are_those_of_the_dynamic_trigger(self):
+        trigger = {"threshold": 0.3, "decay": 0.1}
+        own, other = (coarse(network(**PATH, trigger={"kind": k, **trigger})) for k in ("self-triggered", "dynamic"))
+        assert own.as_dict()["radius"] == other.as_dict()["radius"]
+
+    def test_sampled_checks_enlarge_the_radius_and_keep_their_period(self):
+        plain = coarse(network(**PATH))
+        sampled = network(**PATH, trigger={"kind": "sampled", "threshold": 0.3, "period": 0.004})
+        found = coarse(sampled, run_of(sampled))
+        assert plain.value("radius", "exact") < found.value("radius", "exact") < 1.3 * plain.value("radius", "exact")
+        assert 0.004 <= found.value("min_gap", "improved") <= found.value("min_gap", "observed") + 1e-7
+        slow = network(**PATH, trigger={"kind": "sampled", "threshold": 0.3, "period": 0.5})
+        assert coarse(slow).value("radius", "exact") is None
+
+    def test_laws_without_a_known_bound_on_errors(self):
+        scenario = network(**PATH, trigger={"kind": "periodic", "period": 0.1})
+        found = coarse(scenario)
+        assert found.value("radius", "exact") is None
+        assert found.value("rate", "floquet") > 0
+        assert "'bounded errors' fails" in " ".join(found.notes)
+
+    def test_continuous_coupling_has_no_errors(self):
+        found = coarse(network(**PATH, trigger={"kind": "continuous"}))
+        assert found.value("radius", "exact") == 0.0

@@ -1,0 +1,78 @@
+"""`hybrid-fmu certify` as its users see it."""
+
+import json
+
+import pytest
+
+from cosim.cli.main import main
+
+BASE = """
+name = "small"
+stop_time = 3.0
+[network]
+agents = 3
+edges = [[1, 2], [2, 3]]
+initial = [1.0, 0.0, -0.4]
+[weights]
+kind = "constant"
+value = {value}
+[trigger]
+kind = "{kind}"
+threshold = 0.2
+{more}
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    """Write a scenario with some entries changed."""
+
+    def write(value="1.0", kind="static", more=""):
+        path = tmp_path / "small.toml"
+        path.write_text(BASE.format(value=value, kind=kind, more=more))
+        return str(path)
+
+    return write
+
+
+def test_json_object(scenario, capsys):
+    assert main(["certify", scenario(), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert list(found) == ["rate", "radius", "min_gap", "pe", "notes"]
+    radius, gap = found["radius"], found["min_gap"]
+    assert radius["observed"] <= radius["exact"] <= radius["energy"] <= radius["valid"]
+    assert gap["valid"] <= gap["improved"] <= gap["observed"]
+    # The path on three agents: the Laplacian's eigenvalues are 1 and 3.
+    assert found["rate"]["floquet"] == pytest.approx(1.0, rel=1e-9)
+    assert found["rate"]["valid"] <= found["rate"]["improved"] <= 1.0
+
+
+def test_details(scenario, capsys):
+    assert main(["certify", scenario(), "--json", "--details"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    exact = next(v for v in found["details"] if (v["quantity"], v["form"]) == ("radius", "exact"))
+    assert exact["value"] == found["radius"]["exact"]
+    assert exact["unit"] == "unit of x"
+    assert "section 7" in exact["source"]
+    assert {h["name"] for h in found["hypotheses"]} >= set(exact["needs"])
+
+
+def test_table(scenario, capsys):
+    assert main(["certify", scenario(kind="dynamic", more="decay = 0.7")]) == 0
+    text = capsys.readouterr().out
+    assert "rate of convergence [1/s]" in text
+    assert "ultimate radius of ||x_e|| [unit of x, times exp(-0.7 t)]" in text
+    assert "holds  beta below the Floquet rate: beta is 0.7/s, the Floquet rate 1/s." in text
+
+
+def test_a_disconnected_union_is_null_and_said(scenario, capsys):
+    assert main(["certify", scenario(value="[1.0, 0.0]"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["rate"]["floquet"] is None
+    assert found["radius"]["exact"] is None
+    assert "{1, 2} and {3}" in found["notes"][0]
+
+
+def test_an_unknown_preset_is_wrong_usage(capsys):
+    assert main(["certify", "nowhere"]) == 2
+    assert "no preset 'nowhere'" in capsys.readouterr().err
