@@ -5,8 +5,20 @@ interactions: an event-triggered approach" ("the paper" in this package), and an
 says which of them hold as printed.
 """
 
-from hybrid_model.consensus.agents import DynamicTrigger, EventGenerator, Integrator, StaticTrigger, agent
+from hybrid_model.consensus.agents import (
+    DynamicTrigger,
+    EventGenerator,
+    Integrator,
+    MixedTrigger,
+    StaticTrigger,
+    agent,
+)
 from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound, convergence_bound
+from hybrid_model.consensus.double_integrators import (
+    double_integrator_agents,
+    double_integrator_loop,
+    double_integrator_wires,
+)
 from hybrid_model.consensus.edge_domain import edge_domain_system
 from hybrid_model.consensus.edge_tables import FunctionWeights, SequenceSwitching, TabulatedWeights
 from hybrid_model.consensus.edges import (
@@ -29,11 +41,12 @@ from hybrid_model.consensus.random_switching import (
 )
 from hybrid_model.consensus.report import RunReport, edge_norm, run_report
 from hybrid_model.consensus.scenario import load_scenario, preset_names, read_scenario
-from hybrid_model.consensus.scenario_data import Scenario, replace_trigger
+from hybrid_model.consensus.scenario_data import Channel, Scenario, Trigger, TriggerKind, replace_trigger
 from hybrid_model.consensus.spanning_trees import TreePartition
 from hybrid_model.consensus.switching_sequence import SwitchingSequence
 from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
 from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.vector_agents import vector_agents, vector_loop, vector_wires
 from hybrid_model.consensus.wave_weights import SineWeight, SquareWeight
 from hybrid_model.consensus.weights import ConstantWeight, GatedSine
 from hybrid_model.consensus.windows import BestWindow, RateForm, best_window
@@ -41,6 +54,7 @@ from hybrid_model.consensus.windows import BestWindow, RateForm, best_window
 __all__ = [
     "BestWindow",
     "BoundForm",
+    "Channel",
     "ConstantWeight",
     "ConstantWeights",
     "ConvergenceBound",
@@ -55,6 +69,7 @@ __all__ = [
     "GatedSineWeights",
     "Integrator",
     "JointExcitation",
+    "MixedTrigger",
     "PeriodicSwitching",
     "PiecewiseWeight",
     "RateForm",
@@ -71,6 +86,8 @@ __all__ = [
     "SwitchingSequence",
     "TabulatedWeights",
     "TreePartition",
+    "Trigger",
+    "TriggerKind",
     "WindowExtremes",
     "agent",
     "best_window",
@@ -78,6 +95,9 @@ __all__ = [
     "closed_loop",
     "convergence_bound",
     "distance_weights",
+    "double_integrator_agents",
+    "double_integrator_loop",
+    "double_integrator_wires",
     "edge_domain_system",
     "edge_norm",
     "floquet_spectrum",
@@ -94,4 +114,7 @@ __all__ = [
     "scenario_agents",
     "scenario_excitation",
     "tree_excitations",
+    "vector_agents",
+    "vector_loop",
+    "vector_wires",
 ]
