@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -49,6 +49,13 @@ class Analysis:
     tree: TreePartition
     window: float
     resolution: float = 0.01
+
+    def alike(self, scenario: Scenario) -> Analysis:
+        """The analysis of the same network with other initial states or another trigger; what is known is kept."""
+        other = replace(self, scenario=scenario)
+        own = {field.name for field in fields(self)} | {"initial_disagreement"}
+        other.__dict__.update({name: value for name, value in self.__dict__.items() if name not in own})
+        return other
 
     @cached_property
     def tree_weights(self) -> ExcitationConstants:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 from hybrid_model.consensus.analysis import Analysis
 from hybrid_model.consensus.bounds import Bounds, with_threshold
@@ -91,7 +90,8 @@ def _radius_notes(bounds: Bounds) -> Iterator[str]:
             f"x_e, so the least rho kappa_2 = {best.radius:.6g} (tree {list(best.tree)}) is a bound."
         )
     if bounds.parts and all(decay > 0 for _, decay in bounds.parts):
-        constant = Bounds(_static(bounds.analysis))
+        held = with_threshold(scenario, scenario.trigger.threshold, 0.0)
+        constant = Bounds(bounds.analysis.alike(held))
         numbers = {
             "printed": constant.printed_radius,
             "valid": constant.valid_radius,
@@ -103,15 +103,6 @@ def _radius_notes(bounds: Bounds) -> Iterator[str]:
             "The threshold decays, so x_e goes to 0 and the radii are factors of exp(-beta t). "
             f"With the threshold held at c = {scenario.trigger.threshold:.6g} (beta = 0) the radii are: {listing}."
         )
-
-
-def _static(analysis: Analysis) -> Analysis:
-    copy = replace(analysis, scenario=with_threshold(analysis.scenario, analysis.scenario.trigger.threshold, 0.0))
-    # Everything but the trigger is the same: what is known of the network is kept.
-    for name, value in analysis.__dict__.items():
-        if name not in ("scenario", "tree", "window", "resolution"):
-            copy.__dict__[name] = value
-    return copy
 
 
 def _refuted(bounds: Bounds, seen: Observation | None) -> Iterator[str]:
