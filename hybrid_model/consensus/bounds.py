@@ -44,7 +44,12 @@ class Bounds:
 
     def tree_bound(self, form: BoundForm) -> ConvergenceBound:
         """Theorem 2 along the tree of the analysis, for the trigger's own threshold and decay."""
-        return convergence_bound(self.analysis.scenario, form, self.analysis.tree, self.analysis.window)
+        return self._bound(self.analysis.scenario, form)
+
+    def _bound(self, scenario: Scenario, form: BoundForm) -> ConvergenceBound:
+        analysis = self.analysis
+        constants = analysis.tree_weights if form is BoundForm.PRINTED else analysis.tree_coordinates
+        return convergence_bound(scenario, form, analysis.tree, analysis.window, constants)
 
     @cached_property
     def printed(self) -> ConvergenceBound:
@@ -266,9 +271,7 @@ class Bounds:
         return np.asarray(self.analysis.scenario.network.gain * omega * (np.sqrt(degrees) * radius + 2 * c * degrees))
 
     def _part_bound(self, c: float, decay: float) -> ConvergenceBound:
-        return convergence_bound(
-            with_threshold(self.analysis.scenario, c, decay), BoundForm.VALID, self.analysis.tree, self.analysis.window
-        )
+        return self._bound(with_threshold(self.analysis.scenario, c, decay), BoundForm.VALID)
 
 
 def with_threshold(scenario: Scenario, c: float, decay: float) -> Scenario:

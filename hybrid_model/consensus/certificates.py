@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid_model.consensus.excitation import Signal, WindowExtremes, scenario_excitation
+from hybrid_model.consensus.excitation import ExcitationConstants, Signal, WindowExtremes, scenario_excitation
 from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.spanning_trees import TreePartition
 
@@ -112,7 +112,11 @@ class ConvergenceBound:
 
 
 def convergence_bound(
-    scenario: Scenario, form: BoundForm, partition: TreePartition | None = None, window: float | None = None
+    scenario: Scenario,
+    form: BoundForm,
+    partition: TreePartition | None = None,
+    window: float | None = None,
+    constants: ExcitationConstants | None = None,
 ) -> ConvergenceBound:
     """The rate and the bound of theorems 1 and 2 for one spanning tree.
 
@@ -127,6 +131,8 @@ def convergence_bound(
         The tree, in the underlying graph; by default its first one in edge order.
     window : float, optional
         T [s]; by default `default_window`.
+    constants : ExcitationConstants, optional
+        Those of W_tau (PRINTED) or M (VALID) for this tree and window, if they are known already.
 
     Raises
     ------
@@ -137,7 +143,7 @@ def convergence_bound(
     tree = partition if partition is not None else TreePartition(network.agents, network.underlying_edges)
     length = window if window is not None else default_window(scenario, tree)
     signal = Signal.TREE_WEIGHTS if form is BoundForm.PRINTED else Signal.TREE_COORDINATES
-    constants = scenario_excitation(scenario, signal, tree, length)
+    constants = constants if constants is not None else scenario_excitation(scenario, signal, tree, length)
 
     smallest, largest = float(tree.Lambda[0]), float(tree.Lambda[-1])
     p = network.agents - 1

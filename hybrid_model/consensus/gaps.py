@@ -13,7 +13,7 @@ from hybrid_model.consensus.edge_weights import EdgeWeights
 
 __all__ = ["excited_gap", "frozen_gap", "growing_gap", "printed_gap"]
 
-_ACCURACY = 1e-6
+_ACCURACY = 1e-5
 _GRID = 4
 
 

@@ -12,7 +12,6 @@ from oracles.exact_consensus import exact_run
 
 from hybrid_model.consensus.analysis import Analysis, analyse
 from hybrid_model.consensus.bounds import Bounds
-from hybrid_model.consensus.certificates import BoundForm, convergence_bound
 from hybrid_model.consensus.floquet import transition_matrix
 from hybrid_model.consensus.graphs import complete_edges, disagreement_basis, incidence
 from hybrid_model.consensus.scenario import read_scenario
@@ -112,7 +111,7 @@ def check_run(random, analysis: Analysis, decay, seen):
     growth = np.exp(decay * scenario.stop_time)
     forced = float(np.linalg.norm(D.T @ (run.x_end - free))) * growth
     assert forced <= exact * (1 + ROUNDING)
-    bound = convergence_bound(scenario, BoundForm.VALID, analysis.tree, analysis.window)
+    bound = bounds.valid
     assert float(np.linalg.norm(D.T @ run.x_end)) <= float(bound.at(scenario.stop_time)) * (1 + ROUNDING)
     for (i, j), width in analysis.worst(decay).pairs.items():
         difference = (run.x_end - free)[i - 1] - (run.x_end - free)[j - 1]
@@ -130,9 +129,9 @@ def check_run(random, analysis: Analysis, decay, seen):
 
 def test_some_random_runs():
     seen = Violations()
-    for seed in range(8):
+    for seed in range(6):
         check_network(seed, 4, 10, seen)
-    assert seen.runs == 80
+    assert seen.runs == 60
 
 
 def test_two_agents_violate_the_printed_gap():
