@@ -163,8 +163,9 @@ def named_system(
     outputs: Sequence[str],
     states: Sequence[str],
     name: str,
+    period: float = 0.0,
 ) -> StateSpace:
-    """Return a continuous linear system with named signals.
+    """Return a linear system with named signals.
 
     Parameters
     ----------
@@ -174,18 +175,63 @@ def named_system(
         Names of the m inputs, p outputs and n states.
     name : str
         Name of the system; its dots become ``_``.
+    period : float
+        Sampling period in s of a system in discrete time; 0 for continuous time.
     """
     return control.ss(
         A,
         B,
         C,
         D,
+        dt=period,
         inputs=list(inputs),
         outputs=list(outputs),
         states=list(states),
         name=name.replace(".", "_"),
         remove_useless_states=False,
     )
+
+
+def h_infinity_norm(system: StateSpace, tolerance: float = 1e-6) -> float:
+    """Return the largest gain over all frequencies of a stable continuous system, by python-control.
+
+    Parameters
+    ----------
+    system : control.StateSpace
+        Continuous and stable; any number of inputs and outputs.
+    tolerance : float
+        Relative accuracy.
+
+    Raises
+    ------
+    DeclarationError
+        If the system is discrete or has a pole that is not stable: then the norm is not defined.
+
+    Notes
+    -----
+    Without slycot, python-control compares real parts with an absolute tolerance and needs as many inputs as outputs.
+    So time is scaled to the fastest pole, the gain to one at frequency zero, and rows or columns of zeros are added;
+    the norm is the same but for that factor.
+    """
+    poles = system.poles()
+    if not system.isctime(strict=False) or np.any(poles.real >= 0):
+        raise DeclarationError(
+            f"{system.name} is discrete or has a pole that is not stable, so it has no H-infinity norm: "
+            "give a continuous system whose poles have negative real parts."
+        )
+    if not system.nstates:
+        return float(np.linalg.norm(system.D, 2))
+    fastest = float(np.max(np.abs(poles)))
+    size = max(system.ninputs, system.noutputs)
+    rows, columns = size - system.noutputs, size - system.ninputs
+    scale = float(np.linalg.norm(system.D - system.C @ np.linalg.solve(system.A, system.B), 2)) or 1.0
+    square = control.ss(
+        system.A / fastest,
+        np.pad(system.B / fastest, ((0, 0), (0, columns))),
+        np.pad(system.C / scale, ((0, rows), (0, 0))),
+        np.pad(system.D / scale, ((0, rows), (0, columns))),
+    )
+    return scale * float(control.system_norm(square, "inf", tol=tolerance, print_warning=False))
 
 
 def lti(

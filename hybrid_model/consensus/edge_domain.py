@@ -7,7 +7,6 @@ import numpy as np
 from hybrid_model.consensus.graphs import weighted_laplacian
 from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.spanning_trees import TreePartition
-from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.tables import ScenarioError
 from hybrid_model.consensus.weights import ConstantWeight
 from hybrid_model.linear import StateSpace, named_system
@@ -39,15 +38,10 @@ def edge_domain_system(scenario: Scenario, partition: TreePartition | None = Non
     ScenarioError
         If the weights change with time: then the system is not time-invariant.
     """
-    constant = [w for w in scenario.weights.waveforms if isinstance(w, ConstantWeight)]
-    if len(constant) < len(scenario.weights.waveforms) or not isinstance(scenario.switching, NoSwitching):
-        raise ScenarioError(
-            f"{scenario.name}: the weights change with time, so the edge domain is no time-invariant system: "
-            "give constant weights without switching, or use the Floquet spectrum."
-        )
+    levels = constant_levels(scenario)
     network = scenario.network
     tree = partition or TreePartition(network.agents, network.underlying_edges)
-    laplacian = weighted_laplacian(network.agents, network.edges, [w.level for w in constant])
+    laplacian = weighted_laplacian(network.agents, network.edges, levels)
     from_error = -network.gain * tree.incidence_tree.T @ laplacian
     # x = D_tau (D_tau' D_tau)^-1 x_tau, up to the mean, which the Laplacian does not see.
     to_states = tree.incidence_tree @ np.linalg.inv(tree.edge_laplacian_tree)
@@ -61,6 +55,23 @@ def edge_domain_system(scenario: Scenario, partition: TreePartition | None = Non
         outputs=_names("x_e", len(network.underlying_edges)),
         name=scenario.name,
     )
+
+
+def constant_levels(scenario: Scenario) -> list[float]:
+    """Return the constant weight of each listed edge.
+
+    Raises
+    ------
+    ScenarioError
+        If the weights change with time.
+    """
+    constant = [w for w in scenario.weights.waveforms if isinstance(w, ConstantWeight)]
+    if len(constant) < len(scenario.weights.waveforms) or scenario.edge_weights.period != 0.0:
+        raise ScenarioError(
+            f"{scenario.name}: the weights change with time, so the edge domain is no time-invariant system: "
+            "give constant weights without switching, or use the Floquet spectrum."
+        )
+    return [w.level if on else 0.0 for w, on in zip(constant, scenario.switching.active_at(0.0), strict=True)]
 
 
 def _names(symbol: str, count: int) -> list[str]:
