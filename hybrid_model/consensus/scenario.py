@@ -162,11 +162,12 @@ def _read_switching(top: Table, network: Network, stop_time: float) -> Switching
 
 
 def _read_trigger(top: Table) -> Trigger:
-    keys = {kind: ("kind", *trigger_keys(kind)) for kind in TriggerKind}
-    any_kind = _subtable(top, "trigger", tuple(dict.fromkeys(key for names in keys.values() for key in names)))
-    kind = any_kind.choice("kind", TriggerKind)
-    table = _subtable(top, "trigger", keys[kind])
-    return Trigger(kind, **{key: table.number(key, default) for key, default in trigger_keys(kind).items()})
+    # The kind decides which keys are known, so it is read from a table that accepts whatever is given.
+    given = top.raw("trigger", "must be a table, written [trigger]")
+    kind = _subtable(top, "trigger", tuple(given) if isinstance(given, dict) else ()).choice("kind", TriggerKind)
+    defaults = trigger_keys(kind)
+    table = _subtable(top, "trigger", ("kind", *defaults))
+    return Trigger(kind, **{key: table.number(key, default) for key, default in defaults.items()})
 
 
 def _read_channel(top: Table) -> Channel:
