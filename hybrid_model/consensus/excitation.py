@@ -7,6 +7,7 @@ window follows from the exact integrals of the weights. What is left is a search
 import enum
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -144,10 +145,11 @@ def excitation_constants(
     -----
     Every window integral is exact (closed forms); only `mu2_bar` uses quadrature, on pieces where weights of different
     shape overlap, to about ten digits. If the window is a multiple of the period, no search is needed. Otherwise the
-    starts are searched on a grid that holds all points where a window's end meets a breakpoint, and the best grid cells
-    are refined. For weights that are constant on pieces the extremes of mu1 and mu2 lie at such points (the smallest
-    eigenvalue is concave, the largest one and the norm convex in a window's start between them) and are exact. For
-    others a narrower extremum between two grid points can escape by at most the grid step times ``sup ||S||``.
+    starts are searched on a grid that holds all points where a window's end meets a breakpoint and at least eight for
+    each half wave of the fastest carrier, and the best grid cells are refined. For weights that are constant on pieces
+    the extremes of mu1 and mu2 lie at such points (the smallest eigenvalue is concave, the largest one and the norm
+    convex in a window's start between them) and are exact. For others a narrower extremum between two grid points can
+    escape by at most the grid step times ``sup ||S||``.
     """
     length, starts = _windows(weights, window, horizon)
     extremes = _extremes(factor, weights, length, starts)
@@ -219,9 +221,11 @@ def _window_starts(weights: EdgeWeights, last: float, length: float) -> NDArray[
         ([0.0, last], weights.breakpoints(0.0, last), weights.breakpoints(length, length + last) - length)
     )
     corners = np.unique(corners)
-    steps = np.arange(_POINTS_PER_PIECE) / _POINTS_PER_PIECE
-    inner = corners[:-1, None] + np.diff(corners)[:, None] * steps
-    return np.append(inner.ravel(), last)
+    # A cell holds half an oscillation of the fastest carrier at most, and eight steps at least.
+    fastest = max(carrier.rate for carrier in weights.carriers)
+    counts = np.maximum(np.ceil(np.diff(corners) * fastest / np.pi), 1.0).astype(int) * _POINTS_PER_PIECE
+    inner = [np.linspace(a, b, count + 1)[:-1] for (a, b), count in zip(pairwise(corners), counts, strict=True)]
+    return np.append(np.concatenate(inner), last)
 
 
 def _largest(

@@ -19,7 +19,9 @@ __all__ = ["FunctionCarrier", "FunctionWeight", "TimeFunction", "distance_weight
 TimeFunction = Callable[[Any], Any]
 """A function of time [s] in numpy style: the same line serves floats, arrays and symbols."""
 
-_CHECKS = 257
+_CHECKS, _SAMPLES = 257, 2049
+_TRIED = 100.0
+"""Time [s] over which a function without a period is tried out."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +32,13 @@ class FunctionCarrier:
     kinks: tuple[float, ...] = ()
     period: float | None = None
 
-    @property
+    @cached_property
     def rate(self) -> float:
-        """0.0: not known; quadrature adapts."""
-        return 0.0
+        """An estimate: as many half waves as the samples of one period, or of 100 s, have turning points."""
+        span = self.period if self.period is not None else _TRIED
+        rises = np.sign(np.diff(self.value(np.linspace(0.0, span, _SAMPLES))))
+        rises = rises[rises != 0]
+        return float(np.pi * np.count_nonzero(rises[1:] != rises[:-1]) / span)
 
     @cached_property
     def clock(self) -> RowClock | None:
@@ -92,7 +97,7 @@ class FunctionWeight:
             require("period", self.period, self.period > 0, "must be positive")
         if self.kinks:
             check_rows(self.kinks, self.period, ("kinks", "period"))
-        span = self.period if self.period is not None else 100.0
+        span = self.period if self.period is not None else _TRIED
         times = np.linspace(0.0, span, _CHECKS)
         values = self.carrier.value(times)
         for time, value in zip(times.tolist(), values.tolist(), strict=True):

@@ -17,6 +17,7 @@ __all__ = ["BestWindow", "RateForm", "best_window", "rate_over_window", "search_
 _GRID = 48
 _REFINED = 3
 _ZERO = 1e-12
+_MULTIPLES = 12
 
 
 class RateForm(enum.Enum):
@@ -103,8 +104,17 @@ def best_window(
     span = period if period else scenario.stop_time / 6
     low = shortest if shortest is not None else span / 100
     high = longest if longest is not None else 3 * span
-    natural = [k * period for k in range(1, 4)] if period else []
-    return search_window(lambda window: rate_over_window(scenario, form, window, partition), low, high, natural)
+    return search_window(
+        lambda window: rate_over_window(scenario, form, window, partition), low, high, _natural_windows(scenario, high)
+    )
+
+
+def _natural_windows(scenario: Scenario, longest: float) -> list[float]:
+    """Multiples of each part's own period and fractions of the common one: the rate often peaks there, with a kink."""
+    weights = scenario.edge_weights
+    own = {wave.period for wave in weights.waveforms} | {scenario.switching.period}
+    multiples = [k * period for period in own if period for k in range(1, min(_MULTIPLES, int(longest / period)) + 1)]
+    return multiples + [weights.period / k for k in range(1, _MULTIPLES + 1) if weights.period]
 
 
 def search_window(

@@ -19,11 +19,13 @@ from hybrid_model.consensus.excitation import (
     window_extremes,
 )
 from hybrid_model.consensus.floquet import floquet_spectrum
+from hybrid_model.consensus.function_weights import FunctionWeight
 from hybrid_model.consensus.joint_excitation import joint_excitation, tree_excitations
 from hybrid_model.consensus.scenario import load_scenario, preset_names
 from hybrid_model.consensus.spanning_trees import TreePartition
 from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.table_weights import PiecewiseWeight
+from hybrid_model.consensus.wave_weights import SineWeight
 from hybrid_model.consensus.windows import (
     RateForm,
     best_window,
@@ -273,3 +275,19 @@ def test_every_preset_has_a_window():
             assert scenario_excitation(scenario, Signal.DISAGREEMENT, window=12.0).mu1 > 0.1
         else:
             assert scenario_excitation(scenario, Signal.DISAGREEMENT).mu1 > 0.1
+
+
+def test_many_oscillations_between_breakpoints_are_all_searched():
+    # sin(3 t) beats against sin(2.9 t): 59 waves in the common period, one of which is the highest.
+    weights = EdgeWeights((SineWeight(1.0, 1.0, 3.0), SineWeight(1.0, 1.0, 2.9)), NoSwitching(2))
+    found = window_extremes(np.ones((1, 2)), weights, 0.4)
+    starts = np.linspace(0.0, 20 * math.pi, 200001)
+    sums = weights.integral(starts, starts + 0.4).sum(axis=-1)
+    # A smooth extremum is met to the square of half a step, times the curvature of at most 9*0.8.
+    assert found.mu2 == pytest.approx(sums.max(), abs=1e-6)
+    assert found.mu1 == pytest.approx(sums.min(), abs=1e-6)
+
+
+def test_the_rate_of_a_function_is_counted():
+    assert FunctionWeight(lambda t: 1 + np.sin(7 * t), period=2 * math.pi).carrier.rate == pytest.approx(7.0, abs=1.0)
+    assert FunctionWeight(lambda t: 1 / (1 + t**2)).carrier.rate == 0.0
