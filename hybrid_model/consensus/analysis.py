@@ -21,6 +21,7 @@ from hybrid_model.consensus.graphs import disagreement_basis, incidence
 from hybrid_model.consensus.reachable_sets import ReachableSets
 from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.spanning_trees import TreePartition
+from hybrid_model.consensus.windows import RateForm, best_window
 from hybrid_model.consensus.worst_case import WorstCase, worst_case
 
 __all__ = ["Analysis", "active_edges", "analyse", "connected_parts"]
@@ -197,17 +198,18 @@ def analyse(
 ) -> Analysis:
     """Choose the tree and the window that are not given.
 
-    The tree is the first one, in the order of the edges, whose edges all carry weight; the window is the period, or a
-    short time for constant weights.
+    The tree is the first one, in the order of the edges, whose edges all carry weight; the window is the period, a
+    short time for constant weights, or for weights without a period the one with the best printed rate (if there is
+    none, with the best valid rate).
 
     Raises
     ------
     ValueError
-        If the edges that carry weight do not join all agents, or the weights are not periodic and no window is given.
+        If the edges that carry weight do not join all agents.
     """
     network = scenario.network
     period = scenario.edge_weights.period
-    cycle = window if period is None and window is not None else period or 1.0
+    cycle = scenario.stop_time if period is None else period or 1.0
     if tree is None:
         parts = connected_parts(scenario, cycle)
         if len(parts) > 1:
@@ -217,5 +219,8 @@ def analyse(
         tree = TreePartition(
             network.agents, network.underlying_edges, tuple(active[number - 1] + 1 for number in numbers)
         )
+    if window is None and period is None:
+        found = best_window(scenario, RateForm.PRINTED, tree)
+        window = (found if found.rate > 0 else best_window(scenario, RateForm.VALID, tree)).window
     length = window if window is not None else default_window(scenario, tree)
     return Analysis(scenario, tree, length, resolution)

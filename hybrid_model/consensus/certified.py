@@ -51,6 +51,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
         return [Certified(quantity, form, value, unit, source, needs) for form, value, source, needs in rows]
 
     analysis = bounds.analysis
+    below = "beta below the Floquet rate" if analysis.is_periodic else "beta below the improved rate"
     improved = bounds.improved_rate
     rates = entries(
         "rate",
@@ -84,8 +85,8 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
         ),
         ("valid", bounds.valid_radius, "audit, section 5.2", (union, errors, "beta below the valid rate")),
         ("improved", bounds.improved_radius, "audit, end of section 5.2", (union, errors)),
-        ("energy", bounds.energy_radius, "audit, section 5.3", (union, errors, "beta below the Floquet rate")),
-        ("exact", bounds.exact_radius, "audit, section 7", (union, errors, "beta below the Floquet rate")),
+        ("energy", bounds.energy_radius, "audit, section 5.3", (union, errors, below)),
+        ("exact", bounds.exact_radius, "audit, section 7", (union, errors, *([below] if analysis.is_periodic else []))),
         ("observed", None if seen is None else seen.radius, "run", ()),
     )
     gaps = entries(
@@ -102,7 +103,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
             "improved",
             bounds.improved_gap,
             "audit, section 6, logarithmic, per edge, excitation-aware",
-            (union, errors, "beta below the Floquet rate"),
+            (union, errors, *([below] if analysis.is_periodic else [])),
         ),
         ("observed", None if seen is None else seen.min_gap, "run", ()),
     )

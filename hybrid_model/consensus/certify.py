@@ -85,7 +85,7 @@ def certify(
     tree : TreePartition, optional
         Spanning tree of the tree-wise forms; by default the first in edge order whose edges all carry weight.
     window : float, optional
-        T [s]; by default the period, a short time for constant weights, or the stop time for weights without period.
+        T [s]; by default the period, a short time for constant weights, the best one for weights without a period.
     resolution : float
         Of the exact worst case, see `hybrid_model.consensus.worst_case.ReachableSets`.
     """
@@ -94,12 +94,11 @@ def certify(
     general = network_hypotheses(scenario, cycle)
     if len(connected_parts(scenario, cycle)) > 1:
         return _in_parts(scenario, arc, general, cycle, resolution)
-    length = window if window is not None or period is not None else scenario.stop_time
-    analysis = analyse(scenario, tree, length, resolution)
+    analysis = analyse(scenario, tree, window, resolution)
     bounds = Bounds(analysis)
     seen = None if arc is None else observe(analysis, arc)
     values = certified_values(bounds, seen)
-    hypotheses = (*general, *rate_hypotheses(analysis, bounds.printed.rate, bounds.valid.rate))
+    hypotheses = (*general, *rate_hypotheses(analysis, bounds.printed.rate, bounds.valid.rate, bounds.improved_rate))
     constants = analysis.tree_weights
     return Certificates(
         scenario,

@@ -25,7 +25,7 @@ def scenario_notes(bounds: Bounds, hypotheses: Sequence[Hypothesis], seen: Obser
     yield from _refuted(bounds, seen)
     if seen is not None and seen.radius is not None and seen.initial_share is not None:
         largest = max(bounds.exact_radius or 0.0, seen.radius)
-        if seen.initial_share > _NEGLIGIBLE * largest:
+        if bounds.analysis.is_periodic and seen.initial_share > _NEGLIGIBLE * largest:
             yield (
                 f"The run ends early: the share of the initial state in ||x_e|| is still up to "
                 f"{seen.initial_share:.6g} in its last cycle; the observed radius leaves that share out."
@@ -39,7 +39,7 @@ def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
     if name == "exciting tree":
         return "The tree-free, energy and exact forms need no tree."
     if name == "beta below the printed rate":
-        return "The printed bound does not exist; the energy and exact forms need beta below the Floquet rate only."
+        return "The printed bound does not exist; the exact form needs no beta below alpha_v."
     if name == "beta below the valid rate":
         bound = bounds.valid
         if bound.kappa1 is None or bound.kappa2 is None:
@@ -59,6 +59,8 @@ def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
         )
     if name == "periodic weights":
         return "There is no Floquet rate; the exact radius is that of the run up to the stop time."
+    if name == "beta below the improved rate":
+        return "The energy bound does not exist; the exact radius and the gap hold for the run up to the stop time."
     if name == "bounded errors":
         return "Only the rate of the network without errors is certified."
     return ""

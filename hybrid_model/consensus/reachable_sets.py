@@ -184,7 +184,8 @@ def _support(
     tail: float = _TAIL,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Sum over all earlier periods: the m-th one sees the direction ``(monodromy^T)^m b``."""
-    history = [directions / np.linalg.norm(directions, axis=0)]
+    lengths = np.linalg.norm(directions, axis=0)
+    history = [directions / np.where(lengths > 0, lengths, 1.0)]
     while np.linalg.norm(history[-1]) > tail * np.linalg.norm(history[0]):
         if len(history) > _MOST_CYCLES:
             raise ValueError(
@@ -205,4 +206,4 @@ def _support(
     total = np.zeros_like(directions)
     for points in reversed(partial):
         total = points + monodromy @ total
-    return values * np.linalg.norm(directions, axis=0), total
+    return values * lengths, total

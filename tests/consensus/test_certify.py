@@ -362,3 +362,47 @@ class TestOtherTriggers:
     def test_continuous_coupling_has_no_errors(self):
         found = coarse(network(**PATH, trigger={"kind": "continuous"}))
         assert found.value("radius", "exact") == 0.0
+
+
+class TestWeightsWithoutAPeriod:
+    WEIGHTS = {  # noqa: RUF012
+        "kind": "piecewise",
+        "starts": [0.0, 1.0, 1.7, 3.1, 4.0, 5.2],
+        "values": [[1.0, 0.0, 2.0, 0.5, 0.0, 1.5], [0.0, 1.0, 0.3, 0.0, 1.0, 0.7]],
+    }
+
+    def test_constants_hold_for_the_run(self):
+        scenario = network([[1, 2], [2, 3]], self.WEIGHTS, agents=3, stop_time=6.0)
+        found = coarse(scenario, run_of(scenario))
+        assert found.value("rate", "floquet") is None
+        assert "no period" in " ".join(found.notes)
+        radii = [found.value("radius", form) for form in ("observed", "exact", "energy", "valid")]
+        assert radii == sorted(radii)
+        gaps = [found.value("min_gap", form) for form in ("valid", "improved", "observed")]
+        assert gaps == sorted(gaps)
+        assert 0 < found.value("rate", "valid") <= found.value("rate", "improved")
+
+    def test_exact_radius_of_two_agents_up_to_the_stop_time(self):
+        # Total variation of exp(-2 int_s^t w) is 1 - exp(-2 int_0^t w), each agent's share 1/2: 2c (1 - ...).
+        weights = {"kind": "piecewise", "starts": [0.0, 1.0], "values": [[1.0, 0.25]]}
+        scenario = network([[1, 2]], weights, agents=2, stop_time=3.0)
+        total = 1.0 + 2.0 * 0.25
+        expected = 0.6 * -math.expm1(-2 * total)
+        assert certify(scenario).value("radius", "exact") == pytest.approx(expected, rel=1e-9)
+
+    def test_vanishing_weights_are_not_persistently_exciting(self):
+        # Weight 2^-j in interval j, then none: late windows hold nothing.
+        weights = {
+            "kind": "piecewise",
+            "starts": list(map(float, range(7))),
+            "values": [[2.0**-j for j in range(6)] + [0]],
+        }
+        scenario = network([[1, 2]], weights, agents=2, stop_time=40.0)
+        found = coarse(scenario, run_of(scenario))
+        assert found.value("rate", "printed") is None
+        assert found.value("rate", "valid") is None
+        assert found.value("radius", "energy") is None
+        failed = [h.name for h in found.hypotheses if not h.holds]
+        assert {"periodic weights", "exciting tree"} <= set(failed)
+        assert found.value("radius", "observed") <= found.value("radius", "exact")
+        assert found.value("min_gap", "improved") > 0
