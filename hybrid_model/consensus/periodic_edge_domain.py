@@ -200,7 +200,7 @@ def _cell_blocks(
     generator[:, size:, :size] = -output * lengths[:, None, None]
     generator[:, size:, size:] = moved
     flows = _exponential(generator)
-    back = np.linalg.inv(flows[:, size:, size:])
+    back = np.asarray(np.linalg.inv(flows[:, size:, size:]), dtype=np.float64)
     across = back @ flows[:, size:, :size]
     ahead = flows[:, :size, size:]
     return flows[:, :size, :size] - ahead @ across, ahead @ back, -across, back
