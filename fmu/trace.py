@@ -17,7 +17,7 @@ from fmu.symbols import expressions, symbol_vector, symbols
 from hybrid_model import Automaton, Values
 from hybrid_model.layout import Layout
 from hybrid_model.transitions import Assignments, Trigger
-from hybrid_model.variables import Kind
+from hybrid_model.variables import Kind, Variable
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,20 +126,29 @@ class _Tracer:
     def _assigned(self, kind: Kind, assignments: Assignments, *, keep: bool = False) -> ca.SX:
         elements: list[ca.SX] = []
         for place in self.layout.places[kind]:
-            name, size = place.variable.name, place.variable.size
-            if name in assignments:
-                given = expressions(assignments[name])
-                given = given * size if len(given) == 1 else given
+            variable = place.variable
+            if variable.name in assignments:
+                given = self._elements(variable, assignments[variable.name])
             elif keep:
                 given = expressions(self.arrays[kind][place.at])
             else:
-                raise TraceError(f"{self.automaton.name} gives no value to {name}.")
-            if len(given) != size:
-                raise TraceError(
-                    f"{self.automaton.name}: {name} has {size} elements, but the value computed has {len(given)}."
-                )
+                raise TraceError(f"{self.automaton.name} gives no value to {variable.name}.")
             elements += given
         return ca.vertcat(*elements) if elements else ca.SX(0, 1)
+
+    def _elements(self, variable: Variable, value: Any) -> list[ca.SX]:
+        """Return a computed value row by row; numbers of another shape would land on the wrong elements."""
+        given = expressions(value)
+        shape = value.shape if isinstance(value, ca.SX) and not value.is_scalar() else symbols(value).shape
+        if shape == () and len(given) == 1:
+            return given * variable.size
+        if shape != variable.shape:
+            remedy = f"return an array of shape {variable.shape}, or one number for all elements"
+            raise TraceError(
+                f"{self.automaton.name}: the value computed for {variable.name} has shape {shape}, but {variable.name} "
+                f"has shape {variable.shape}: {remedy if variable.shape else 'return one number'}."
+            )
+        return given
 
     def _scalars(self, margins: list[Any], what: str) -> ca.SX:
         elements = []

@@ -85,21 +85,31 @@ class Layout:
         Raises
         ------
         DeclarationError
-            If a value has not the variable's shape.
+            If a value is neither one number nor an array of the variable's shape: numbers of another shape would land
+            on the wrong elements.
         """
         vector = np.zeros(self.sizes[kind]) if otherwise is None else otherwise.copy()
         for place in self.places[kind]:
-            name = place.variable.name
-            if name in assignments:
-                value = assignments[name]
-                try:
-                    vector[place.at] = value if not place.variable.shape else np.reshape(value, -1)
-                except (TypeError, ValueError) as error:
-                    raise DeclarationError(
-                        f"{self.automaton.name}: the value computed for {name} is {value!r}, but {name} has shape "
-                        f"{place.variable.shape}: return a number for a scalar, an array for a vector."
-                    ) from error
+            if place.variable.name in assignments:
+                vector[place.at] = self._flat(place.variable, assignments[place.variable.name])
         return vector
+
+    def _flat(self, variable: Variable, value: Value) -> Value:
+        """Return a value as one number, or row by row."""
+        if type(value) is float:
+            return value
+        try:
+            given = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise DeclarationError(
+                f"{self.automaton.name}: the value computed for {variable.name} is {value!r}: {_remedy(variable)}."
+            ) from error
+        if given.shape not in ((), variable.shape):
+            raise DeclarationError(
+                f"{self.automaton.name}: the value computed for {variable.name} has shape {given.shape}, but "
+                f"{variable.name} has shape {variable.shape}: {_remedy(variable)}."
+            )
+        return given.ravel() if given.shape else given
 
     def describe(self, vectors: Mapping[Kind, FloatArray]) -> str:
         """Return ``name = value`` for the scalars of some vectors, for messages."""
@@ -110,6 +120,12 @@ class Layout:
         ]
         shown = ", ".join(pairs[:12])
         return shown + (f", and {len(pairs) - 12} more" if len(pairs) > 12 else "")
+
+
+def _remedy(variable: Variable) -> str:
+    if not variable.shape:
+        return "return one number"
+    return f"return an array of shape {variable.shape}, or one number for all elements"
 
 
 def not_finite(layout: Layout, kind: Kind, vector: FloatArray) -> str | None:

@@ -217,6 +217,16 @@ def _vector(variables: list[Variable], assigned: Assignments, otherwise: FloatAr
     at = 0
     for variable in variables:
         if variable.name in assigned:
-            vector[at : at + variable.size] = np.ravel(np.asarray(assigned[variable.name], dtype=np.float64))
+            vector[at : at + variable.size] = _flat(variable, assigned[variable.name])
         at += variable.size
     return vector
+
+
+def _flat(variable: Variable, value: Any) -> FloatArray:
+    array = np.asarray(value, dtype=np.float64)
+    if array.shape not in ((), variable.shape):
+        raise DeclarationError(
+            f"the value computed for {variable.name} has shape {array.shape}, but {variable.name} has shape "
+            f"{variable.shape}: return one number, or an array of that shape."
+        )
+    return array.ravel()

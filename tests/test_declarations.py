@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
+from fmu.errors import TraceError
+from fmu.trace import trace
 from hybrid_model.models import BouncingBall
 from hybrid_model.variables import Kind, element_names
 
@@ -211,8 +213,10 @@ def ball_with(**maps):
         ({"flow_map": lambda self, s: {"h": s.vv, "v": -s.g}}, r"Wrong has no variable 'vv'; it has t, h, v, g, e\."),
         (
             {"flow_map": lambda self, s: {"h": [s.v, 1.0], "v": -s.g}},
-            r"Wrong: the value computed for h is .*, but h has shape \(\): return a number for a scalar",
+            r"Wrong: the value computed for h has shape \(2,\), but h has shape \(\): return one number\.",
         ),
+        ({"flow_map": lambda self, s: {"h": np.array([s.v]), "v": -s.g}}, r"has shape \(1,\), but h has shape \(\)"),
+        ({"flow_map": lambda self, s: {"h": "fast", "v": -s.g}}, r"computed for h is 'fast': return one number\."),
         ({"jump_set": lambda self, s: s.h <= 0.0}, r"the jump set of 'jump' of Wrong is a boolean: return a margin"),
         ({"jump_set": lambda self, s: True}, r"the jump set of 'jump' of Wrong is a boolean"),
         ({"jump_set": lambda self, s: np.bool_(True)}, r"is a boolean"),
@@ -234,6 +238,67 @@ def ball_with(**maps):
 def test_maps_that_return_something_else(maps, sentence):
     with pytest.raises(hm.DeclarationError, match=sentence):
         run(ball_with(**maps))
+
+
+class Matrix(hm.HybridAutomaton):
+    """A matrix that follows what a function makes of it, and is set by another at t = 0.5."""
+
+    m = hm.State([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    done = hm.DiscreteState(0)
+
+    def __init__(self, rate, reset, **values):
+        self._rate, self._reset = rate, reset
+        super().__init__(**values)
+
+    def flow_map(self, s):
+        return {"m": self._rate(s.m)}
+
+    def jump_set(self, s):
+        return s.t - 0.5 - s.done
+
+    def jump_map(self, s):
+        return {"m": self._reset(s.m), "done": 1.0}
+
+
+SHAPES = {
+    "transposed": (lambda m: m.T, r"\(3, 2\)"),
+    "flattened": (np.ravel, r"\(6,\)"),
+    "one row": (lambda m: m[0], r"\(3,\)"),
+    "a longer shape": (lambda m: m.reshape(1, 2, 3), r"\(1, 2, 3\)"),
+    "one element": (lambda m: m[:1, :1], r"\(1, 1\)"),
+}
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("where", ["flow map", "jump map"])
+def test_a_matrix_of_another_shape_is_refused_in_floats_and_in_symbols(name, where):
+    wrong, shape = SHAPES[name]
+    block = Matrix(wrong, np.negative) if where == "flow map" else Matrix(np.negative, wrong)
+    sentence = rf"Matrix: the value computed for m has shape {shape}, but m has shape \(2, 3\): return an array of"
+    with pytest.raises(hm.DeclarationError, match=sentence):
+        run(block)
+    with pytest.raises(TraceError, match=sentence):
+        trace(block)
+
+
+def test_a_matrix_of_its_shape_and_one_number_for_all_elements_are_taken():
+    start = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    # m' = -m up to 0.5, then 7, then e^(-1/2) of it; 1e-12: the tolerances of the run.
+    for seven in (7.0, 7, np.float64(7.0), np.array(7.0), np.full((2, 3), 7.0), [[7.0] * 3] * 2):
+        block = Matrix(np.negative, lambda m, seven=seven: seven)
+        arc = run(block)
+        np.testing.assert_allclose(arc.end.m, np.full((2, 3), 7.0 * np.exp(-0.5)), atol=1e-12)
+        np.testing.assert_allclose(arc.at("m", 0.25), start * np.exp(-0.25), atol=1e-12)
+        reset = trace(block).resets[0](0.5, np.arange(6.0), 0.0, [], [])[0]
+        np.testing.assert_array_equal(np.ravel(reset), np.full(6, 7.0))
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_the_verifier_refuses_another_shape_too(name):
+    wrong, shape = SHAPES[name]
+    arc = run(Matrix(np.negative, np.negative))
+    with pytest.raises(hm.DeclarationError, match=rf"m has shape {shape}, but m has shape \(2, 3\)"):
+        hm.verify(Matrix(wrong, np.negative), arc)
 
 
 def test_outputs_must_all_be_given():

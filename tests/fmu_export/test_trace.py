@@ -28,7 +28,10 @@ def time_event(time, reset, *, internal=False):
     [
         ({"flow_map": lambda self, s: {"x": 1.0 if s.x > 0 else 0.0}}, r"flow_map of Block .*np\.where"),
         ({"flow_map": lambda self, s: {"x": math.sin(s.x)}}, r"flow_map of Block .*np\.sin"),
-        ({"flow_map": lambda self, s: {"x": np.array([s.x, s.x])}}, "x has 1 elements, but the value computed has 2"),
+        (
+            {"flow_map": lambda self, s: {"x": np.array([s.x, s.x])}},
+            r"computed for x has shape \(2,\), but x has shape \(\)",
+        ),
         (time_event(lambda self, s: s.x, lambda self, s: {"k": s.k + 1}), "depends on the time, a continuous state"),
         (time_event(lambda self, s: s.t + 1, lambda self, s: {"k": s.k + 1}), "depends on the time"),
         (
