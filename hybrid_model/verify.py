@@ -49,7 +49,8 @@ def verify(
     data : HybridArc, Samples or pandas.DataFrame
         All states at points of hybrid time, both sides of every jump; see `Samples` for tables and files.
     inputs : mapping, optional
-        Input name -> number, array, function of time or `Signal`, as in `simulate`. An input that is not given is read
+        Input name -> number, array, function of time or `Signal`, as in `simulate`. Functions are called between the
+        first and the last time of the data only. An input that is not given is read
         off the data: those of an arc at every time; a discrete one of samples holds from each sample to the next, a
         continuous one runs straight. One that the data do not have keeps its start value.
     tolerances : Tolerances, optional

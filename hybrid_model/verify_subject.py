@@ -66,7 +66,7 @@ class Subject:
     DataError
         If a state is missing or has the wrong shape.
     DeclarationError
-        If an input is unknown.
+        If an input is unknown or has the wrong shape.
     """
 
     def __init__(
@@ -180,8 +180,11 @@ class Subject:
         elif callable(value):
             function = value
         else:
-            return _constant(_value(variable, np.broadcast_to(np.asarray(value, dtype=np.float64), variable.shape)))
-        return lambda t, k: _value(variable, np.broadcast_to(np.asarray(function(t)), variable.shape))
+            return _constant(_input(variable, value))
+        # The sets are also looked at a little before and after a sample, where the user's function need not be defined.
+        known = self.samples.t[np.isfinite(self.samples.t)]
+        start, end = (float(known.min()), float(known.max())) if known.size else (-math.inf, math.inf)
+        return lambda t, k: _input(variable, function(min(max(t, start), end)))
 
     def _sampled(self, variable: Variable, data: Samples | HybridArc) -> InputAt:
         """Read an input off the data: between samples by an arc's own function of time, else by a rule."""
@@ -206,6 +209,20 @@ class Subject:
 def _value(variable: Variable, flat: FloatArray) -> Any:
     array = np.asarray(flat, dtype=np.float64)
     return array.reshape(variable.shape) if variable.shape else array.reshape(-1)[0]
+
+
+def _input(variable: Variable, given: Any) -> Any:
+    """Return an input that somebody gave, as a number or an array of the input's shape."""
+    try:
+        array = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise DeclarationError(f"input {variable.name} is {given!r}: give numbers.") from error
+    if array.shape not in ((), variable.shape):
+        raise DeclarationError(
+            f"input {variable.name} has shape {variable.shape}, but the value given has shape {array.shape}: give one "
+            f"number for all elements, or an array of shape {variable.shape}."
+        )
+    return _value(variable, np.broadcast_to(array, variable.shape))
 
 
 def _constant(value: Any) -> InputAt:

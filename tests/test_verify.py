@@ -469,6 +469,52 @@ def test_inputs_come_from_where_they_are_known():
     assert not hm.verify(Tracker(), bare, inputs={"u": np.cos}).ok
 
 
+@pytest.mark.parametrize("wrap", [lambda f: f, hm.Signal], ids=["function", "signal"])
+@pytest.mark.parametrize("bare", [False, True])
+def test_functions_of_time_are_not_called_outside_the_data(wrap, bare):
+    seen = []
+
+    def recorded(t):
+        seen.append(t)
+        return np.sin(t)
+
+    class Watched(Tracker):
+        """With sets, which are looked at a little before and after each sample, and jumps at both ends."""
+
+        k = hm.DiscreteState(0)
+
+        def flow_set(self, s):
+            return s.x + 1.0
+
+        def jump_set(self, s):
+            return s.t - (1.0 + 2.0 * s.k) + 0.0 * s.u
+
+        def jump_map(self, s):
+            return {"k": s.k + 1.0}
+
+    arc = hm.simulate(Watched(), 3.0, t_start=1.0, inputs={"u": wrap(recorded)})
+    assert [jump.t for jump in arc.jumps] == [1.0, 3.0]
+    seen.clear()
+    report = hm.verify(Watched(), arc.samples(["x", "k"]) if bare else arc, inputs={"u": wrap(recorded)})
+    assert report.ok, str(report)
+    assert (min(seen), max(seen)) == (1.0, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ([1.0, 2.0], r"input u has shape \(\), but the value given has shape \(2,\): give one number"),
+        (lambda t: [1.0], r"input u has shape \(\), but the value given has shape \(1,\): give one number"),
+        ("fast", "input u is 'fast': give numbers"),
+        (lambda t: {}, "input u is {}: give numbers"),
+    ],
+)
+def test_inputs_that_do_not_fit_are_refused(given, message):
+    samples = hm.Samples([0.0, 1.0], [0, 0], {"x": [0.0, 1.0]})
+    with pytest.raises(hm.DeclarationError, match=message):
+        hm.verify(Tracker(), samples, inputs={"u": given})
+
+
 def test_breakpoints_of_inputs_are_never_integrated_across():
     # A pulse of 0.1 ms, which an integrator that does not know of it steps over, between two samples 2 s apart.
     pulse = hm.Signal(lambda t: 1e4 * (0.7 <= t < 0.7001), [0.7, 0.7001])
