@@ -13,6 +13,7 @@ from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching, SwitchingSequence
 from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
 from hybrid_model.consensus.wave_weights import SineWeight, SquareWeight
+from hybrid_model.consensus.weights import GatedSine, WeightMap
 
 BASE = {
     "name": "three",
@@ -208,7 +209,9 @@ def test_edges_of_one_agent_need_one_block():
     kinds = (SineWeight(1.0, 0.5, 1.0), SineWeight(1.0, 0.5, 1.0))
     tables = (PiecewiseWeight((0.0, 1.0), (1.0, 2.0), 3.0), PiecewiseWeight((0.0, 1.0), (1.0, 2.0), math.sqrt(2) + 1))
     mixed = (PiecewiseWeight((0.0, 1.0), (1.0, 2.0), 3.0), PiecewiseWeight((0.0, 1.0), (1.0, 2.0)))
+    maps = tuple(GatedSine(4.0, 5.0, 20.0, map=weight_map) for weight_map in WeightMap)
     for waveforms, message in (
+        (maps, "need the blocks GatedAbsoluteSineWeights, GatedSineWeights; give all edges of an agent weights of one"),
         (tables, "repeat with the periods 3 s, 2.41421 s without a common multiple"),
         (mixed, "repeat with the periods 3 s, none without a common multiple"),
     ):
