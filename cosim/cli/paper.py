@@ -18,6 +18,7 @@ from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult
 from fmu.export import Fmi, export_fmu
 from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound, convergence_bound
+from hybrid_model.consensus.certify import Certificates, certify
 from hybrid_model.consensus.figures import save_paper_figures
 from hybrid_model.consensus.network import agent_name, closed_loop, scenario_agents
 from hybrid_model.consensus.report import RunReport, edge_norm, run_report
@@ -57,6 +58,7 @@ class Comparison:
     exact: list[Trial]
     fixed: dict[float, Trial]
     bounds: dict[BoundForm, ConvergenceBound]
+    certificates: Certificates
 
 
 def add_parser(commands: Any) -> None:
@@ -105,9 +107,9 @@ def _compare(kind: str, scenario: Scenario, out: Path) -> Comparison:
         result = run_fixed_step(fmu_system(scenario, fmus), scenario.stop_time, step, record=counters)
         fixed[step] = _fixed_trial(step, scenario, report, result)
     bounds = {form: convergence_bound(scenario, form) for form in BoundForm}
-    return Comparison(
-        scenario, arc, report, [str(path.relative_to(out)) for path in fmus.values()], exact, fixed, bounds
-    )
+    progress(f"{kind}: computing the bounds")
+    names = [str(path.relative_to(out)) for path in fmus.values()]
+    return Comparison(scenario, arc, report, names, exact, fixed, bounds, certify(scenario, arc))
 
 
 def _export(kind: str, scenario: Scenario, out: Path) -> dict[str, Path]:
@@ -191,7 +193,7 @@ def _trial_summary(trial: Trial) -> dict[str, Any]:
 
 
 def _certificates(comparison: Comparison) -> dict[str, Any]:
-    return {
+    along_tree = {
         form.value: {
             "window": bound.window,
             "rate": bound.rate,
@@ -203,6 +205,7 @@ def _certificates(comparison: Comparison) -> dict[str, Any]:
         }
         for form, bound in comparison.bounds.items()
     }
+    return {**along_tree, **comparison.certificates.as_dict()}
 
 
 def _table(comparisons: Mapping[str, Comparison]) -> str:

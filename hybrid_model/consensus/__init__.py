@@ -14,6 +14,8 @@ from hybrid_model.consensus.agents import (
     agent,
 )
 from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound, convergence_bound
+from hybrid_model.consensus.certified import Certified
+from hybrid_model.consensus.certify import Certificates, certify
 from hybrid_model.consensus.double_integrators import (
     double_integrator_agents,
     double_integrator_loop,
@@ -54,6 +56,8 @@ from hybrid_model.consensus.windows import BestWindow, RateForm, best_window
 __all__ = [
     "BestWindow",
     "BoundForm",
+    "Certificates",
+    "Certified",
     "Channel",
     "ConstantWeight",
     "ConstantWeights",
@@ -92,6 +96,7 @@ __all__ = [
     "agent",
     "best_window",
     "broadcast_wires",
+    "certify",
     "closed_loop",
     "convergence_bound",
     "distance_weights",

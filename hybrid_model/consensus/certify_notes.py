@@ -6,8 +6,11 @@ from collections.abc import Iterator, Sequence
 
 from hybrid_model.consensus.analysis import Analysis
 from hybrid_model.consensus.bounds import Bounds, with_threshold
+from hybrid_model.consensus.corollary import corollary_rate, corollary_rate_exact
 from hybrid_model.consensus.hypotheses import PAPER_LAWS, Hypothesis
+from hybrid_model.consensus.joint_excitation import joint_excitation
 from hybrid_model.consensus.observed import Observation
+from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.trees import tree_radii
 
 __all__ = ["scenario_notes"]
@@ -21,6 +24,7 @@ def scenario_notes(bounds: Bounds, hypotheses: Sequence[Hypothesis], seen: Obser
         if not hypothesis.holds:
             yield f"Hypothesis '{hypothesis.name}' fails: {hypothesis.detail} {_remains(hypothesis, bounds)}".strip()
     yield from _constants(bounds.analysis)
+    yield from _corollary(bounds.analysis)
     yield from _radius_notes(bounds)
     yield from _refuted(bounds, seen)
     if seen is not None and seen.radius is not None and seen.initial_share is not None:
@@ -78,6 +82,19 @@ def _constants(analysis: Analysis) -> Iterator[str]:
     if analysis.spectrum is not None:
         multipliers = ", ".join(f"{abs(value):.6g}" for value in analysis.spectrum.multipliers)
         yield f"Moduli of the Floquet multipliers over {analysis.spectrum.period:.6g} s: {multipliers}."
+
+
+def _corollary(analysis: Analysis) -> Iterator[str]:
+    """The repaired corollary on switching topologies."""
+    if isinstance(analysis.scenario.switching, NoSwitching) or analysis.is_constant:
+        return
+    joint, gain = joint_excitation(analysis.scenario), analysis.scenario.network.gain
+    yield (
+        f"Corollary 1, repaired: {len(joint.intervals)} jointly connected intervals of at most {joint.longest:.6g} s, "
+        f"least weight on a spanning tree of each w_min = {joint.weakest.weight:.6g}, window {joint.window:.6g} s: "
+        f"mu1 of N is at least {joint.mu1_of_paths:.6g} (exactly {joint.exact.mu1:.6g}), the rate at least "
+        f"{corollary_rate(joint, gain):.6g}/s (with the exact constants {corollary_rate_exact(joint, gain):.6g}/s)."
+    )
 
 
 def _radius_notes(bounds: Bounds) -> Iterator[str]:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import islice
 
-import networkx as nx
-
-from hybrid_model.consensus.analysis import Analysis, active_edges
+from hybrid_model.consensus.analysis import Analysis
 from hybrid_model.consensus.certificates import BoundForm, convergence_bound
-from hybrid_model.consensus.spanning_trees import TreePartition
+from hybrid_model.consensus.joint_excitation import tree_excitations
 from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
 
-__all__ = ["TreeRadius", "exciting_trees", "tree_radii"]
+__all__ = ["TreeRadius", "tree_radii"]
 
 _MOST_TREES = 200
 
@@ -40,17 +36,6 @@ class TreeRadius:
     radius: float
 
 
-def exciting_trees(analysis: Analysis) -> Iterator[TreePartition]:
-    """Spanning trees whose edges all carry weight, as partitions of the underlying graph."""
-    network = analysis.scenario.network
-    graph: nx.Graph[int] = nx.Graph()
-    for edge in active_edges(analysis.scenario, analysis.cycle):
-        graph.add_edge(*network.edges[edge], number=edge + 1, weight=edge)
-    for tree in nx.SpanningTreeIterator(graph):
-        numbers = sorted(number for _, _, number in tree.edges(data="number"))
-        yield TreePartition(network.agents, network.underlying_edges, tuple(numbers))
-
-
 def tree_radii(analysis: Analysis, form: BoundForm = BoundForm.VALID, most: int = _MOST_TREES) -> list[TreeRadius]:
     """The bound of theorem 2 along each exciting spanning tree, for beta = 0; at most `most` of them.
 
@@ -66,7 +51,8 @@ def tree_radii(analysis: Analysis, form: BoundForm = BoundForm.VALID, most: int 
     c = analysis.scenario.trigger.threshold or 1.0
     scenario = replace(analysis.scenario, trigger=Trigger(TriggerKind.STATIC, c))
     found = []
-    for tree in islice(exciting_trees(analysis), most):
+    for excitation in tree_excitations(scenario, analysis.window, most):
+        tree = excitation.partition
         bound = convergence_bound(scenario, form, tree, analysis.window)
         if bound.kappa2 is not None:
             found.append(TreeRadius(tree.tree, bound.rate, bound.kappa2, bound.edge_factor * bound.kappa2))

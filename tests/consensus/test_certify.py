@@ -16,14 +16,15 @@ from hybrid_model.consensus.analysis import analyse
 from hybrid_model.consensus.bounds import Bounds
 from hybrid_model.consensus.certificates import BoundForm
 from hybrid_model.consensus.certify import certify
-from hybrid_model.consensus.corollary import bottleneck_weight, repaired_corollary, tree_connectivity
-from hybrid_model.consensus.floquet import transition_matrix
+from hybrid_model.consensus.corollary import corollary_rate, corollary_rate_exact
+from hybrid_model.consensus.floquet import floquet_spectrum, transition_matrix
 from hybrid_model.consensus.flow_cells import flow_cells
 from hybrid_model.consensus.graphs import disagreement_basis, weighted_laplacian
+from hybrid_model.consensus.joint_excitation import joint_excitation
 from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.reachable_sets import ReachableSets
 from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.trees import exciting_trees, tree_radii
+from hybrid_model.consensus.trees import tree_radii
 from hybrid_model.consensus.worst_case import worst_case
 
 
@@ -225,7 +226,7 @@ class TestFlowCells:
 class TestTreesAndCorollary:
     def test_the_number_of_exciting_trees(self):
         # The cycle on four agents has four spanning trees.
-        assert len(list(exciting_trees(analyse(load_scenario("paper-a"))))) == 4
+        assert len(tree_radii(analyse(load_scenario("paper-a")))) == 4
 
     def test_every_tree_bounds_the_exact_radius(self):
         analysis = analyse(load_scenario("paper-a-static"))
@@ -238,28 +239,24 @@ class TestTreesAndCorollary:
     def test_repaired_corollary_on_the_example(self, dwell):
         scenario = load_scenario("paper-a")
         scenario = replace(scenario, switching=replace(scenario.switching, dwell=dwell))
-        found = repaired_corollary(scenario)
-        assert 0 < found.guaranteed <= found.exact
-        assert found.window == pytest.approx(2 * max(np.diff(found.cuts)))
+        joint = joint_excitation(scenario)
+        rates = [corollary_rate(joint, 1.0), corollary_rate_exact(joint, 1.0), floquet_spectrum(scenario).rate]
+        assert rates[0] > 0
+        assert rates == sorted(rates)
 
     def test_repaired_corollary_on_random_switching(self):
         random = np.random.default_rng(409)
-        for _ in range(60):
-            active = [random.choice(6, random.integers(1, 4), replace=False) + 1 for _ in range(3)]
+        for _ in range(40):
+            active = [(random.choice(6, int(random.integers(3, 5)), replace=False) + 1).tolist() for _ in range(3)]
             scenario = network(
                 [[1, 2], [2, 3], [3, 4], [4, 1], [1, 3], [2, 4]],
                 {"kind": "constant", "value": random.uniform(0.2, 2, 6).tolist()},
-                switching={"dwell": 0.5, "active": [row.tolist() for row in active]},
+                switching={"dwell": 0.5, "active": [*active, [1, 2, 3]]},
             )
-            if not scenario.edge_weights.period or bottleneck_weight(scenario, 0.0, scenario.edge_weights.period) == 0:
-                with pytest.raises(ValueError, match=r"repaired corollary|not connected"):
-                    repaired_corollary(scenario)
-                continue
-            found = repaired_corollary(scenario)
-            assert 0 < found.guaranteed <= found.exact * (1 + 1e-12)
-
-    def test_least_connectivity_of_trees(self):
-        assert tree_connectivity(4) == pytest.approx(2 - math.sqrt(2))
+            joint = joint_excitation(scenario)
+            rates = [corollary_rate(joint, 1.0), corollary_rate_exact(joint, 1.0), floquet_spectrum(scenario).rate]
+            assert rates[0] > 0
+            assert rates == sorted(rates)
 
 
 class TestHypothesesThatFail:

@@ -14,9 +14,10 @@ from hybrid_model.consensus import counterexamples
 from hybrid_model.consensus.analysis import analyse
 from hybrid_model.consensus.bounds import Bounds
 from hybrid_model.consensus.certificates import BoundForm, convergence_bound
-from hybrid_model.consensus.corollary import repaired_corollary
+from hybrid_model.consensus.corollary import corollary_rate
 from hybrid_model.consensus.excitation import Signal, signal_factor
 from hybrid_model.consensus.graphs import weighted_laplacian
+from hybrid_model.consensus.joint_excitation import joint_excitation
 from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.report import run_report
 from hybrid_model.consensus.scenario import load_scenario
@@ -63,7 +64,7 @@ def numbers(example):
     norm = counterexamples.integrated_norm(3)
     analysis, printed, valid = static.analysis, static.printed, static.valid
     best = printed.disturbance / -math.expm1(-printed.rate * printed.window)
-    corollary = repaired_corollary(analysis.scenario)
+    corollary = joint_excitation(analysis.scenario)
     literal_window = convergence_bound(analysis.scenario, BoundForm.PRINTED, analysis.tree, 3 * math.pi)
     late = analysis.scenario.trigger.threshold / (static.printed_speed * printed.kappa2)
     return {
@@ -105,8 +106,9 @@ def numbers(example):
         "C, example": printed.error_bound,
         "share of disagreement left, vanishing weights": counterexamples.vanishing_weights().actual,
         "alpha_v printed with the corollary's window 3 pi, example": literal_window.rate,
-        "mu1 of N guaranteed by the repaired corollary, example": corollary.guaranteed,
+        "mu1 of N guaranteed by the repaired corollary, example": corollary.mu1_of_paths,
         "mu1 of N, example": analysis.disagreement.mu1,
+        "rate by the repaired corollary, example": corollary_rate(corollary, 1.0),
         "largest certifiable alpha_v, star": counterexamples.certifiable_rate(4, STAR, 0.4 * math.pi),
         "largest certifiable alpha_v, path": counterexamples.certifiable_rate(4, PATH, 0.4 * math.pi),
         "mean of the states at 50 s, example": float(dynamic_run.x_end.mean()),
