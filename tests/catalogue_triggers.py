@@ -58,6 +58,9 @@ def trigger_cases(case):
         found[f"agent2_{law}"] = case(scenario_agents(law_scenario(law))["agent2"], 9.07, heard)
     found["ring_continuous"] = case(closed_loop(replace(ring, trigger=Trigger(TriggerKind.CONTINUOUS))), 5.03)
     found["absolute_self_triggered"] = case(scenario_agents(absolute_self_triggered())["agent2"], 9.07, heard)
+    sines = {"kind": "sine", "mean": [1.0, 0.6, 0.3], "depth": 0.9, "rate": 3.0, "phase": [0.0, 1.0, 2.0]}
+    swinging = replace(read_scenario({**RING, "weights": sines}), trigger=LAWS["self_triggered"])
+    found["agent1_sine_self_triggered"] = case(scenario_agents(swinging)["agent1"], 5.03, heard)
     for name, channel in CHANNELS.items():
         found[f"ring_{name}"] = case(closed_loop(replace(ring, channel=channel)), 5.03)
     found["ring_agent1_loss"] = case(

@@ -9,12 +9,13 @@ from typing import Any
 import hybrid_model as hm
 from hybrid_model.consensus.continuous import ContinuousBroadcast
 from hybrid_model.consensus.relative_triggers import GirardTrigger, RelativeTrigger
-from hybrid_model.consensus.self_triggers import ConstantSelfTrigger, GatedSineSelfTrigger
+from hybrid_model.consensus.self_trigger_weights import ConstantSelfTrigger, GatedSineSelfTrigger, SineSelfTrigger
 from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching, Switching
 from hybrid_model.consensus.tables import ScenarioError
 from hybrid_model.consensus.timed_triggers import PeriodicBroadcast, SampledTrigger
 from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
 from hybrid_model.consensus.triggers import DynamicTrigger, MixedTrigger, StaticTrigger
+from hybrid_model.consensus.wave_weights import SineWeight
 from hybrid_model.consensus.weights import ConstantWeight, GatedSine, Waveform, WeightMap
 
 
@@ -105,6 +106,15 @@ def _self_trigger(trigger: Trigger, around: Surroundings) -> hm.HybridAutomaton:
     constant = [waveform for waveform in around.waveforms if isinstance(waveform, ConstantWeight)]
     if len(constant) == len(edges):
         return ConstantSelfTrigger(level=[waveform.level for waveform in constant], **common)
+    sines = [waveform for waveform in around.waveforms if isinstance(waveform, SineWeight)]
+    if len(sines) == len(edges):
+        return SineSelfTrigger(
+            mean=[waveform.mean for waveform in sines],
+            depth=[waveform.depth for waveform in sines],
+            rate=[waveform.rate for waveform in sines],
+            phase=[waveform.phase for waveform in sines],
+            **common,
+        )
     gated = [waveform for waveform in around.waveforms if isinstance(waveform, GatedSine)]
     if len(gated) < len(edges):
         raise ScenarioError(_unknown_future(f"weights {type(around.waveforms[0]).__name__}"))
@@ -121,6 +131,6 @@ def _self_trigger(trigger: Trigger, around: Surroundings) -> hm.HybridAutomaton:
 def _unknown_future(what: str) -> str:
     return (
         f"[trigger] kind is 'self-triggered', but no self-triggered agent can compute ahead over {what}; it knows "
-        "constant and gated-sine weights, switched periodically or not at all. Take kind = 'dynamic', which gives the "
-        "same broadcasts."
+        "constant, sine and gated-sine weights, switched periodically or not at all. Take kind = 'dynamic', which gives "
+        "the same broadcasts."
     )

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from catalogue_triggers import RING
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.exact_consensus import exact_run
@@ -82,6 +83,25 @@ def run_report_as_exact(scenario):
         counts, event_times, x_end = report.events_per_agent, report.event_times, report.x_end
 
     return Exact
+
+
+def test_over_sine_weights_too():
+    entries = {
+        **RING,
+        "weights": {
+            "kind": "sine",
+            "mean": [1.0, 0.6, 0.3],
+            "depth": [1.0, 0.5, 0.9],
+            "rate": 3.0,
+            "phase": [0.0, 1.0, 2.0],
+        },
+        "trigger": {"kind": "dynamic", "threshold": 0.1, "decay": 0.1},
+    }
+    scenario = read_scenario(entries)
+    ahead = with_kind(scenario, TriggerKind.SELF_TRIGGERED)
+    report = run_report(ahead, run(ahead))
+    assert sum(report.events_per_agent) > 5
+    compare(scenario, report, run_report_as_exact(scenario))
 
 
 def test_a_broadcast_comes_at_the_time_that_was_computed_and_with_the_error_that_was_predicted():
