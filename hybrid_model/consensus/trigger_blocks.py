@@ -131,6 +131,6 @@ def _self_trigger(trigger: Trigger, around: Surroundings) -> hm.HybridAutomaton:
 def _unknown_future(what: str) -> str:
     return (
         f"[trigger] kind is 'self-triggered', but no self-triggered agent can compute ahead over {what}; it knows "
-        "constant, sine and gated-sine weights, switched periodically or not at all. Take kind = 'dynamic', which gives "
-        "the same broadcasts."
+        "constant, sine and gated-sine weights, switched periodically or not at all. Take kind = 'dynamic', which "
+        "gives the same broadcasts."
     )
