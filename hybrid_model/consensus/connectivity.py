@@ -14,10 +14,10 @@ from hybrid_model.consensus.switching import Switching
 
 __all__ = [
     "algebraic_connectivity",
+    "all_spanning_trees",
     "components",
     "joint_connectivity_window",
     "spanning_tree_count",
-    "spanning_trees",
     "union_edges",
 ]
 
@@ -122,7 +122,7 @@ def spanning_tree_count(agents: int, edges: Sequence[Edge]) -> int:
     return round(float(np.linalg.det(matrix[1:, 1:])))
 
 
-def spanning_trees(agents: int, edges: Sequence[Edge]) -> Iterator[tuple[int, ...]]:
+def all_spanning_trees(agents: int, edges: Sequence[Edge]) -> Iterator[tuple[int, ...]]:
     """All spanning trees as ascending tuples of edge numbers from 1, in lexicographic order; none if not connected.
 
     The work is proportional to their number, which `spanning_tree_count` tells in advance: ``n**(n - 2)`` for the

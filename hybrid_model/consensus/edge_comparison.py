@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from hybrid_model.consensus.certificates import BoundForm, convergence_bound
-from hybrid_model.consensus.edge_gains import edge_gains
+from hybrid_model.consensus.edge_gains import edge_domain_gains
 from hybrid_model.consensus.periodic_edge_domain import periodic_gains
 from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.spanning_trees import TreePartition
@@ -60,7 +60,7 @@ def compare_edge_domain(
     partition, window
         As in `hybrid_model.consensus.certificates.convergence_bound`.
     resolution : float
-        As in `edge_gains` and `periodic_gains`.
+        As in `edge_domain_gains` and `periodic_gains`.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def compare_edge_domain(
     static = replace(scenario, trigger=Trigger(TriggerKind.STATIC, c))
     bounds = {form: convergence_bound(static, form, partition, window) for form in BoundForm}
     if scenario.edge_weights.period == 0.0:
-        constant = edge_gains(scenario, resolution)
+        constant = edge_domain_gains(scenario, resolution)
         rate, radius, l2 = constant.rate, constant.radius, constant.l2
     else:
         periodic = periodic_gains(scenario, resolution)

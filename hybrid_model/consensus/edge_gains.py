@@ -20,7 +20,7 @@ from hybrid_model.consensus.tables import ScenarioError
 from hybrid_model.consensus.worst_case import worst_case
 from hybrid_model.linear import h_infinity_norm
 
-__all__ = ["EdgeGains", "edge_gains", "impulse_modes"]
+__all__ = ["EdgeGains", "edge_domain_gains", "impulse_modes"]
 
 _ROUNDING = 1e-12
 """Share of the largest rate below which a rate counts as zero."""
@@ -67,7 +67,7 @@ class EdgeGains:
         return float(-self.poles[0])
 
 
-def edge_gains(scenario: Scenario, resolution: float = 0.01) -> EdgeGains:
+def edge_domain_gains(scenario: Scenario, resolution: float = 0.01) -> EdgeGains:
     """Gains of the edge domain.
 
     Parameters

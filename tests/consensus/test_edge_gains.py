@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from hybrid_model.consensus.certificates import BoundForm
 from hybrid_model.consensus.edge_comparison import compare_edge_domain
 from hybrid_model.consensus.edge_domain import edge_domain_system
-from hybrid_model.consensus.edge_gains import edge_gains, impulse_modes
+from hybrid_model.consensus.edge_gains import edge_domain_gains, impulse_modes
 from hybrid_model.consensus.exponential_sums import absolute_integral, zeros
 from hybrid_model.consensus.floquet import floquet_spectrum, transition_matrix
 from hybrid_model.consensus.graphs import disagreement_basis, incidence
@@ -46,7 +46,7 @@ RING = {
 
 def test_two_agents_in_closed_form():
     """``x_e' = -2kw x_e - 2kw (e_2 - e_1)``: one pole, gains sqrt(2) and 2."""
-    gains = edge_gains(network(**PAIR))
+    gains = edge_domain_gains(network(**PAIR))
     np.testing.assert_allclose(gains.poles, [-2 * 1.3 * 0.7], rtol=1e-12)
     assert gains.l2 == pytest.approx(np.sqrt(2), rel=BISECTION)
     assert gains.peak == pytest.approx(2.0, rel=1e-12)
@@ -57,7 +57,7 @@ def test_complete_graph_with_one_weight_in_closed_form():
     """All poles are -kwn, ``g_e = -kwn exp(-kwn t)`` times +-1: peak 2 on each edge; sqrt(n) and c_n for the norms."""
     n, w = 4, 0.6
     edges = [[i, j] for i in range(1, n + 1) for j in range(i + 1, n + 1)]
-    gains = edge_gains(network(edges, [w] * len(edges)))
+    gains = edge_domain_gains(network(edges, [w] * len(edges)))
     np.testing.assert_allclose(gains.poles, -w * n, rtol=1e-9)
     np.testing.assert_allclose(gains.peaks, 2.0, rtol=1e-9)
     assert gains.h_infinity == pytest.approx(np.sqrt(n), rel=BISECTION)
@@ -86,7 +86,7 @@ def test_h_infinity_norm_of_a_resonance():
 
 def test_peak_gains_against_quadrature_of_python_controls_impulse_responses():
     scenario = network(**RING)
-    gains, system = edge_gains(scenario), edge_domain_system(scenario)
+    gains, system = edge_domain_gains(scenario), edge_domain_system(scenario)
     times = np.linspace(0.0, 12.0, 12001)
     responses = control.impulse_response(system, times).outputs
     # The trapezoidal rule on a step of 1 ms: error about h^2 rate^2/12 = 4e-6, and kinks where a response changes sign.
@@ -102,7 +102,7 @@ def test_bang_bang_errors_reach_the_peak_gain():
     times = np.linspace(0.0, horizon, 40001)
     response = modes[edge] @ np.exp(-np.outer(rates, times))
     reached = np.trapezoid(response * np.sign(response), times, axis=1).sum()
-    assert reached == pytest.approx(edge_gains(scenario).peaks[edge], rel=1e-4)  # trapezoid at 40001 points
+    assert reached == pytest.approx(edge_domain_gains(scenario).peaks[edge], rel=1e-4)  # trapezoid at 40001 points
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -151,7 +151,7 @@ def test_l2_gain_of_two_agents_that_meet_now_and_then(on, off):
 
 
 def test_l2_gain_of_constant_weights_is_the_h_infinity_norm():
-    assert periodic_l2_gain(network(**RING)) == pytest.approx(edge_gains(network(**RING)).l2, rel=BISECTION)
+    assert periodic_l2_gain(network(**RING)) == pytest.approx(edge_domain_gains(network(**RING)).l2, rel=BISECTION)
 
 
 def lifted_gain(scenario, cells, phases=5):
@@ -253,8 +253,8 @@ def test_exact_values_lie_on_the_right_side_of_the_valid_bounds(scenario):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: edge_gains(load_scenario("paper-a")), "paper-a: the weights change with time"),
-        (lambda: edge_gains(network([[1, 2], [2, 3]], [1.0, 0.0])), "do not join all agents"),
+        (lambda: edge_domain_gains(load_scenario("paper-a")), "paper-a: the weights change with time"),
+        (lambda: edge_domain_gains(network([[1, 2], [2, 3]], [1.0, 0.0])), "do not join all agents"),
         (
             lambda: periodic_gains(
                 network([[1, 2], [2, 3]], [1.0, 1.0], switching={"dwell": 1.0, "active": [[1], []]})

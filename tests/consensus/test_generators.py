@@ -8,10 +8,10 @@ import pytest
 
 from hybrid_model.consensus.connectivity import (
     algebraic_connectivity,
+    all_spanning_trees,
     components,
     joint_connectivity_window,
     spanning_tree_count,
-    spanning_trees,
     union_edges,
 )
 from hybrid_model.consensus.generators import (
@@ -149,7 +149,7 @@ def brute_force_trees(agents, edges):
 @pytest.mark.parametrize("seed", range(12))
 def test_all_spanning_trees(seed):
     graph = erdos_renyi_graph(5 + seed % 2, 0.6, seed)
-    found = list(spanning_trees(graph.agents, graph.edges))
+    found = list(all_spanning_trees(graph.agents, graph.edges))
     assert found == list(brute_force_trees(graph.agents, graph.edges))
     assert len(found) == spanning_tree_count(graph.agents, graph.edges)
 
@@ -158,7 +158,7 @@ def test_all_spanning_trees(seed):
 def test_cayleys_formula(agents):
     edges = complete_graph(agents).edges
     assert spanning_tree_count(agents, edges) == agents ** (agents - 2)
-    assert sum(1 for _ in spanning_trees(agents, edges)) == agents ** (agents - 2)
+    assert sum(1 for _ in all_spanning_trees(agents, edges)) == agents ** (agents - 2)
 
 
 def test_every_tree_gives_the_same_edge_states():
@@ -167,7 +167,7 @@ def test_every_tree_gives_the_same_edge_states():
     weights = np.array([1.0, 0.5, 2.0, 0.3, 0.7, 1.1])
     D = incidence(4, graph.edges)
     spectrum = np.linalg.eigvalsh(disagreement_basis(4).T @ (D * weights) @ D.T @ disagreement_basis(4))
-    for tree in spanning_trees(4, graph.edges):
+    for tree in all_spanning_trees(4, graph.edges):
         part = TreePartition(4, graph.edges, tree)
         M = part.Gamma.T @ (part.R_by_edge * weights) @ part.R_by_edge.T @ part.Gamma
         root = np.sqrt(part.Lambda)
@@ -176,7 +176,7 @@ def test_every_tree_gives_the_same_edge_states():
 
 def test_a_graph_in_parts_has_no_tree():
     edges = ((1, 2), (3, 4))
-    assert list(spanning_trees(5, edges)) == []
+    assert list(all_spanning_trees(5, edges)) == []
     assert spanning_tree_count(5, edges) == 0
     assert components(5, edges) == [[1, 2], [3, 4], [5]]
     assert algebraic_connectivity(5, edges) == pytest.approx(0.0, abs=ROUNDING)
