@@ -74,7 +74,7 @@ def save_arc(read: ArcValues, flows: Sequence[FlowRecord], arc: HybridArc, path:
         "t": arc.t,
         "j": arc.j,
         "channels": samples,
-        "discrete": np.array([flow.z for flow in flows]),
+        "discrete": np.array([flow.z[: read.layout.sizes[Kind.DISCRETE]] for flow in flows]),
         "jump_t": np.array([jump.t for jump in arc.jumps], dtype=np.float64),
         "jump_index": np.array([jump.index for jump in arc.jumps], dtype=np.int64),
         **sides,

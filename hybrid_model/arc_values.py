@@ -7,7 +7,9 @@ else about arcs is the same for both.
 
 from __future__ import annotations
 
+import bisect
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -40,7 +42,7 @@ class ArcValues(ABC):
         """Return the continuous states in the vector that a flow carries."""
 
     @abstractmethod
-    def inputs(self, t: float, x: FloatArray) -> FloatArray:
+    def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """Return the input vector at a point of a flow."""
 
     @abstractmethod
@@ -66,7 +68,7 @@ class ArcValues(ABC):
 
     def values(self, t: float, x: FloatArray, z: FloatArray) -> Values:
         """Return all values but the outputs, by name."""
-        return self.layout.values(t, self.states(x), z, self.inputs(t, x), self.parameters)
+        return self.layout.values(t, self.states(x), z, self.inputs(t, x, z), self.parameters)
 
     def value(self, name: str, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """Return one variable's value, of the variable's shape."""
@@ -78,12 +80,12 @@ class ArcValues(ABC):
         elif kind is Kind.PARAMETER:
             vector = self.parameters
         else:
-            vector = self.inputs(t, x) if kind is Kind.INPUT else self.outputs(t, x, z)
+            vector = self.inputs(t, x, z) if kind is Kind.INPUT else self.outputs(t, x, z)
         return np.asarray(self._places[name].take(vector), dtype=np.float64)
 
     def channels(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """Return states, inputs and outputs in one vector."""
-        return np.concatenate([self.states(x), self.inputs(t, x), self.outputs(t, x, z)])
+        return np.concatenate([self.states(x), self.inputs(t, x, z), self.outputs(t, x, z)])
 
 
 class ComputedValues(ArcValues):
@@ -107,7 +109,7 @@ class ComputedValues(ArcValues):
         """See `ArcValues.states`."""
         return x
 
-    def inputs(self, t: float, x: FloatArray) -> FloatArray:
+    def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """See `ArcValues.inputs`; continuous from the right."""
         return self._signals.at(t)
 
@@ -116,6 +118,37 @@ class ComputedValues(ArcValues):
         if self.layout.sizes[Kind.OUTPUT] == 0:
             return np.zeros(0)
         return self.layout.pack(Kind.OUTPUT, self.automaton.output_values(self.values(t, x, z)))
+
+
+class ReceivedValues(ComputedValues):
+    """Reads the run of one part of a network, whose inputs are what it received.
+
+    Several receptions and jumps may fall on one instant, so the inputs depend on t and j: the flows carry j as one
+    more discrete state, the last.
+
+    Parameters
+    ----------
+    automaton, parameters, signals
+        As in `ComputedValues`; `signals` tells what the inputs from outside the network are.
+    received : sequence of (float, int, ndarray)
+        Hybrid time from which on, and the constants in the input vector; in order, the first at the start.
+    """
+
+    def __init__(
+        self,
+        automaton: Automaton,
+        parameters: FloatArray,
+        signals: Inputs,
+        received: Sequence[tuple[float, int, FloatArray]],
+    ) -> None:
+        super().__init__(automaton, parameters, signals)
+        self._times = [(t, j) for t, j, _ in received]
+        self._held = [held for _, _, held in received]
+
+    def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.inputs`."""
+        last = bisect.bisect_right(self._times, (t, int(z[-1]))) - 1
+        return self._signals.with_held(self._held[max(last, 0)], t)
 
 
 class RecordedValues(ArcValues):
@@ -139,7 +172,7 @@ class RecordedValues(ArcValues):
         """See `ArcValues.states`."""
         return x[: self.layout.sizes[Kind.STATE]]
 
-    def inputs(self, t: float, x: FloatArray) -> FloatArray:
+    def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """See `ArcValues.inputs`."""
         first = self.layout.sizes[Kind.STATE]
         return x[first : first + self.layout.sizes[Kind.INPUT]]
@@ -152,7 +185,7 @@ class RecordedValues(ArcValues):
         """See `ArcValues.interpolation_error`."""
         vectors = {
             Kind.STATE: self.states(self.errors),
-            Kind.INPUT: self.inputs(0.0, self.errors),
+            Kind.INPUT: self.inputs(0.0, self.errors, np.zeros(0)),
             Kind.OUTPUT: self.outputs(0.0, self.errors, np.zeros(0)),
         }
         kind = self.variable(name).kind

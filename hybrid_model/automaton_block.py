@@ -69,7 +69,7 @@ class AutomatonBlock(Block):
         if kind is Kind.INPUT:
             changed = run.inputs.hold_element(index, value)
             if changed:
-                self.recording.received(run.t, run.inputs.held)
+                self.recording.receive(run.t, run.j, run.inputs.held)
         else:
             vector = {Kind.STATE: run.x, Kind.DISCRETE: run.z, Kind.PARAMETER: run.p}[kind]
             changed = bool(vector[index] != value)

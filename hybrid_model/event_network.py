@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hybrid_model.arc import HybridArc
+from hybrid_model.arc_values import ReceivedValues
 from hybrid_model.automaton_block import AutomatonBlock
 from hybrid_model.compose import Composition, ElementWire
 from hybrid_model.errors import SimulationError, WiringError
@@ -172,7 +173,14 @@ def _result(
     arcs = {}
     for part, block in blocks.items():
         run, recording = block.run, block.recording
-        run.stopped, run.message = stop, message
-        run.inputs = recording.inputs(run.inputs)
-        arcs[part] = HybridArc(run, recording.flows, recording.jumps)
+        read = ReceivedValues(run.automaton, run.p, run.inputs, recording.received)
+        flows = [replace(flow, z=np.append(flow.z, j)) for j, flow in enumerate(recording.flows)]
+        arcs[part] = HybridArc.recorded(
+            read,
+            flows,
+            recording.jumps,
+            stop=stop,
+            message=message,
+            event_tolerance=run.solver.event_tolerance,
+        )
     return NetworkRun(arcs, stop, message, t)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from hybrid_model.flow import FlowPiece
 from hybrid_model.flow_record import FlowRecord
-from hybrid_model.signals import Inputs, RecordedInputs
 from hybrid_model.variables import FloatArray
 
 if TYPE_CHECKING:
@@ -23,6 +22,13 @@ class Recording:
         At its start.
     keep : bool
         Whether to keep anything at all.
+
+    Attributes
+    ----------
+    jumps : list of JumpRecord
+        In order.
+    received : list of (float, int, ndarray)
+        Hybrid time from which on, and the constants in the inputs.
     """
 
     def __init__(self, execution: Execution, *, keep: bool = True) -> None:
@@ -31,7 +37,7 @@ class Recording:
         self._closed: list[FlowRecord] = []
         self._open = FlowRecord(execution.t, execution.x, execution.z, ())
         self._pieces: list[FlowPiece] = []
-        self._received = [(execution.t, execution.inputs.held)]
+        self.received = [(execution.t, execution.j, execution.inputs.held)]
 
     def flowed(self, pieces: Sequence[FlowPiece]) -> None:
         """Note steps of the present flow."""
@@ -46,15 +52,10 @@ class Recording:
         self._closed.append(self._open.extended(self._pieces))
         self._open, self._pieces = FlowRecord(jump.t, jump.x_after, jump.z_after, ()), []
 
-    def received(self, t: float, held: FloatArray) -> None:
-        """Note that inputs changed at `t` in s: the constants in them from now on."""
+    def receive(self, t: float, j: int, held: FloatArray) -> None:
+        """Note that inputs changed at (t, j), t in s: the constants in them from now on."""
         if self._keep:
-            self._received.append((t, held))
-
-    def inputs(self, inputs: Inputs) -> RecordedInputs:
-        """Return the inputs of the run, whose present state is `inputs`, as a function of time."""
-        times, held = zip(*self._received, strict=True)
-        return RecordedInputs(inputs, times, held)
+            self.received.append((t, j, held))
 
     @property
     def flows(self) -> list[FlowRecord]:

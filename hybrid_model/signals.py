@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bisect
 import copy
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -115,9 +114,13 @@ class Inputs:
 
     def at(self, t: float) -> FloatArray:
         """Return u at time `t`; the array must not be written to."""
+        return self.with_held(self._held, t)
+
+    def with_held(self, held: FloatArray, t: float) -> FloatArray:
+        """Return u at time `t` as it is with other constants in it; the array must not be written to."""
         if not self._signals:
-            return self._held
-        u = self._held.copy()
+            return held
+        u = held.copy()
         for place, signal in self._signals:
             u[place.at] = _sample(place.variable, signal, t)
         return u
@@ -131,29 +134,6 @@ class Inputs:
         other = copy.copy(self)
         other._held = self._held.copy()
         return other
-
-
-class RecordedInputs(Inputs):
-    """The input vector of a run that is over: what was held in it from when on.
-
-    Parameters
-    ----------
-    inputs : Inputs
-        At the end of the run.
-    times : sequence of float
-        In s, in order: when the constants changed.
-    held : sequence of ndarray
-        The constants from each of these times on; of several at one time the last counts.
-    """
-
-    def __init__(self, inputs: Inputs, times: Sequence[float], held: Sequence[FloatArray]) -> None:
-        self.__dict__.update(inputs.copy().__dict__)
-        self._times, self._history = list(times), list(held)
-
-    def at(self, t: float) -> FloatArray:
-        """Return u at time `t`."""
-        self._held = self._history[max(bisect.bisect_right(self._times, t) - 1, 0)]
-        return super().at(t)
 
 
 def _finite_breakpoints(name: str, signal: Signal) -> list[float]:

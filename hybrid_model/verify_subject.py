@@ -193,7 +193,7 @@ class Subject:
             return _constant(_value(variable, column[0]))
         # Anything may happen to an input at a sample, so nothing is integrated across one.
         self.breakpoints = np.union1d(self.breakpoints, t[np.isfinite(t)])
-        if isinstance(data, HybridArc):
+        if isinstance(data, HybridArc) and not variable.discrete:
             return lambda time, k: _value(variable, data.at(variable.name, np.clip(time, t[0], t[-1])))
 
         def source(time: float, k: int) -> Any:

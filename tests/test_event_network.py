@@ -176,3 +176,49 @@ def test_times_that_make_no_run_are_refused(start, end):
 def test_an_unknown_part_is_named():
     with pytest.raises(hm.WiringError, match="agent9"):
         hm.simulate_network(ring(3), 0.1).event_times("agent9", "trigger.broadcast")
+
+
+def test_what_a_jump_saw_is_what_had_arrived_before_it(tmp_path):
+    """At t = 1 the asker takes its input over and sends, and gets the answer at the same instant, after its jump."""
+
+    class Asker(hm.HybridAutomaton):
+        u = hm.Input(5.0, discrete=True)
+        x = hm.State(0.0)
+        sent = hm.DiscreteState(0.0, output=True)
+        seen = hm.Output(discrete=True)
+
+        def flow_map(self, s):
+            return {"x": 1.0}
+
+        def outputs(self, s):
+            return {"seen": s.u}
+
+        transitions = (hm.Jump("ask", lambda self, s: s.x - 1.0, lambda self, s: {"x": -s.u, "sent": s.sent + 1.0}),)
+
+    class Answerer(hm.HybridAutomaton):
+        u = hm.Input(0.0, discrete=True)
+        answered = hm.DiscreteState(0.0)
+        answer = hm.DiscreteState(5.0, output=True)
+
+        transitions = (
+            hm.Jump(
+                "answer",
+                lambda self, s: s.u - s.answered - 0.5,
+                lambda self, s: {"answered": s.u, "answer": s.answer + 2.0},
+            ),
+        )
+
+    network = hm.Composition(
+        "talk", {"asker": Asker(), "answerer": Answerer()}, {"asker.u": "answerer.answer", "answerer.u": "asker.sent"}
+    )
+    arc = hm.simulate_network(network, 8.0).arcs["asker"]
+    path = tmp_path / "asker.npz"
+    arc.save(path)
+    for found in (arc, hm.load_arc(path)):
+        first = found.jumps[0]
+        assert (found.before(first).u, found.after(first).u) == (5.0, 7.0)
+        assert [float(found.at("seen", first.t, j=j)) for j in (0, 1)] == [5.0, 7.0]
+    # x goes to -5 at t = 1, so the second question comes six seconds later and sees 7.
+    assert [jump.t for jump in arc.jumps] == pytest.approx([1.0, 7.0], abs=1e-12)
+    assert arc.jumps[1].x_after == pytest.approx([-7.0])
+    assert hm.verify(network.parts["asker"], arc).ok
