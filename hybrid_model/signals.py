@@ -58,7 +58,7 @@ class Inputs:
         places = {place.variable.name: place for place in layout.places[Kind.INPUT]}
         for name, value in (given or {}).items():
             if name not in places:
-                raise DeclarationError(unknown_name(f"{layout.automaton.name} (inputs)", name, places))
+                raise DeclarationError(unknown_input(layout.automaton.name, name, places))
             if isinstance(value, Signal):
                 self._signals.append((places[name], value.value))
                 breakpoints += _finite_breakpoints(name, value)
@@ -77,9 +77,7 @@ class Inputs:
         """Set an input to a constant; return whether that changed it."""
         place = next((q for q in self._layout.places[Kind.INPUT] if q.variable.name == name), None)
         if place is None:
-            raise DeclarationError(
-                unknown_name(f"{self._layout.automaton.name} (inputs)", name, dict.fromkeys(self.names))
-            )
+            raise DeclarationError(unknown_input(self._layout.automaton.name, name, dict.fromkeys(self.names)))
         given = start_array(f"{self._layout.automaton.name}.{name}", value)
         if given.shape not in ((), place.variable.shape):
             raise DeclarationError(
@@ -134,6 +132,13 @@ class Inputs:
         other = copy.copy(self)
         other._held = self._held.copy()
         return other
+
+
+def unknown_input(owner: str, name: str, known: Mapping[str, object]) -> str:
+    """Return the sentence for an input that an automaton does not have."""
+    if not known:
+        return f"{owner} has no input {name!r}; it has no inputs: leave it out."
+    return unknown_name(f"{owner} (inputs)", name, known)
 
 
 def _finite_breakpoints(name: str, signal: Signal) -> list[float]:

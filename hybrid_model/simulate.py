@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from hybrid_model.arc import HybridArc
+from hybrid_model.arguments import real_number, require_automaton, require_inputs, require_options
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import SimulationError
 from hybrid_model.execution import Execution
@@ -51,8 +52,15 @@ def simulate(
     Raises
     ------
     SimulationError
-        For times that are not finite or reversed, and for values that do not stay finite.
+        For times that are not finite or reversed, for options of another type, and for values that do not stay finite.
+    DeclarationError
+        If `automaton` is no instance of an automaton, or an input is unknown or has the wrong shape.
     """
+    require_automaton("simulate", automaton)
+    require_inputs(inputs)
+    require_options("solver", solver, Solver, first="method")
+    require_options("zeno", zeno, ZenoGuard, first="max_jumps")
+    t_start, t_end = real_number("t_start", t_start), real_number("t_end", t_end)
     if not (math.isfinite(t_end) and t_end >= t_start):
         raise SimulationError(
             f"the end time is {t_end} s and the start {t_start} s: give a finite end after the start."

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hybrid_model.arc import HybridArc
+from hybrid_model.arguments import require_automaton, require_inputs, require_options
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DataError
 from hybrid_model.samples import Samples
@@ -56,7 +57,7 @@ def verify(
     tolerances : Tolerances, optional
         How exact the samples are.
     method : str
-        Integrator of ``scipy.integrate.solve_ivp`` for the flow map; one that the simulation has not used.
+        Integrator of ``scipy.integrate.solve_ivp`` for the flow map, by its name; one that the simulation has not used.
 
     Returns
     -------
@@ -68,8 +69,13 @@ def verify(
     DataError
         If the data are no samples, or a state is missing or has the wrong shape.
     DeclarationError
-        If an input is unknown.
+        If `automaton` is no instance of an automaton, an input is unknown, or a value has the wrong shape.
+    SimulationError
+        For options of another type, and a method of another name.
     """
+    require_automaton("verify", automaton)
+    require_inputs(inputs)
+    require_options("tolerances", tolerances, Tolerances, first="rtol")
     data = data if isinstance(data, HybridArc) else _samples(data)
     subject = Subject(automaton, data, inputs)
     tolerances = tolerances or Tolerances()

@@ -10,11 +10,14 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.optimize import minimize_scalar
 
+from hybrid_model.errors import SimulationError
 from hybrid_model.transitions import Priority
 from hybrid_model.variables import FloatArray
 from hybrid_model.verify_report import Findings
 from hybrid_model.verify_subject import Subject, Tolerances
 
+METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
+"""Integrators of ``scipy.integrate.solve_ivp``."""
 BETWEEN = 9
 """Points between two samples at which the sets are checked."""
 INTEGRATION = 1e-4
@@ -41,10 +44,17 @@ class FlowCheck:
     findings : Findings
         Where violations go.
     method : str
-        Integrator of ``scipy.integrate.solve_ivp``.
+        One of `METHODS`.
+
+    Raises
+    ------
+    SimulationError
+        If the method is none of these.
     """
 
     def __init__(self, subject: Subject, tolerances: Tolerances, findings: Findings, method: str) -> None:
+        if method not in METHODS:
+            raise SimulationError(f"verify was given method = {method!r}: the methods are {', '.join(METHODS)}.")
         self._subject = subject
         self._tolerances = tolerances
         self._findings = findings

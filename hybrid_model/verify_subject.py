@@ -13,9 +13,9 @@ from hybrid_model.arc import HybridArc
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DataError, DeclarationError
 from hybrid_model.samples import Samples
-from hybrid_model.signals import InputValue, Signal
+from hybrid_model.signals import InputValue, Signal, unknown_input
 from hybrid_model.transitions import Assignments, Trigger
-from hybrid_model.variables import FloatArray, Kind, Values, Variable, unknown_name
+from hybrid_model.variables import FloatArray, Kind, Values, Variable
 
 InputAt = Callable[[float, int], Any]
 """An input at time t of the step that begins with sample k."""
@@ -162,7 +162,7 @@ class Subject:
         variables = {v.name: v for v in self.automaton.of_kind(Kind.INPUT)}
         for name in given:
             if name not in variables:
-                raise DeclarationError(unknown_name(f"{self.automaton.name} (inputs)", name, variables))
+                raise DeclarationError(unknown_input(self.automaton.name, name, variables))
         sources = {}
         for name, variable in variables.items():
             if name in given:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import itertools
+import math
+import numbers
 from collections import deque
 from dataclasses import dataclass
+from typing import Any
 
+from hybrid_model.errors import SimulationError
 from hybrid_model.locate import ulp
 
 HISTORY = 12
@@ -38,6 +42,11 @@ class ZenoGuard:
     max_jumps : int
         More jumps than this, of all names together, end the run with `Stop.JUMPS`: events that grow ever denser
         without accumulating (a threshold that decays faster than the states converge) have no other end.
+
+    Raises
+    ------
+    SimulationError
+        If a count is not a whole number from 1 on, or another limit is negative or not finite.
     """
 
     jumps_at_once: int = 1000
@@ -46,6 +55,22 @@ class ZenoGuard:
     remainder: float = 1e-6
     spread: float = 0.05
     max_jumps: int = 100_000
+
+    def __post_init__(self) -> None:
+        for name in ("jumps_at_once", "jumps_in_window", "max_jumps"):
+            count = getattr(self, name)
+            if not (_finite(count) and count >= 1 and count == int(count)):
+                raise SimulationError(f"ZenoGuard option {name} = {count!r}: give a whole number of jumps, 1 or more.")
+            # A whole number may come as a float, as in 1e6.
+            object.__setattr__(self, name, int(count))
+        for name in ("window", "remainder", "spread"):
+            limit = getattr(self, name)
+            if not (_finite(limit) and limit >= 0.0):
+                raise SimulationError(f"ZenoGuard option {name} = {limit!r}: give a finite number, 0 or more.")
+
+
+def _finite(value: Any) -> bool:
+    return isinstance(value, numbers.Real) and math.isfinite(value)
 
 
 class ZenoMonitor:

@@ -7,6 +7,7 @@ import pytest
 
 import hybrid_model as hm
 from hybrid_model.layout import Layout
+from hybrid_model.models import BouncingBall
 from hybrid_model.signals import Inputs
 
 
@@ -98,6 +99,19 @@ def test_inputs_that_do_not_fit(given, error, sentence):
 def test_an_unknown_name_cannot_be_held():
     with pytest.raises(hm.DeclarationError, match="no variable 'v'"):
         inputs().hold("v", 1.0)
+
+
+@pytest.mark.parametrize(
+    "give",
+    [
+        lambda: Inputs(Layout(BouncingBall())).hold("u", 1.0),
+        lambda: hm.simulate(BouncingBall(), 1.0, inputs={"u": 1.0}),
+    ],
+    ids=["held", "in a run"],
+)
+def test_an_automaton_without_inputs_says_so(give):
+    with pytest.raises(hm.DeclarationError, match=r"^BouncingBall has no input 'u'; it has no inputs: leave it out\.$"):
+        give()
 
 
 def test_a_run_follows_its_inputs():

@@ -576,12 +576,28 @@ def test_where_the_last_jump_lands_is_free():
         ),
         (hm.Samples([0.0], [0], {"h": [[1.0]], "v": [0.0]}), {}, hm.DataError, r"h has shape \(1,\) in the samples"),
         ({"t": [0.0]}, {}, hm.DataError, "a dict holds no samples of a run: give a HybridArc, Samples or a DataFrame"),
-        (ball_by_hand(), {"inputs": {"u": 1.0}}, hm.DeclarationError, "no variable 'u'"),
+        (ball_by_hand(), {"inputs": {"u": 1.0}}, hm.DeclarationError, "no input 'u'; it has no inputs"),
+        (ball_by_hand(), {"inputs": [("u", 1.0)]}, hm.SimulationError, r"inputs = .* is no mapping: write inputs="),
+        (ball_by_hand(), {"method": "RK4"}, hm.SimulationError, "method = 'RK4': the methods are RK23, RK45, DOP853,"),
+        (ball_by_hand(), {"method": None}, hm.SimulationError, "method = None: the methods are"),
+        (
+            ball_by_hand(),
+            {"tolerances": 1e-6},
+            hm.SimulationError,
+            r"tolerances = 1e-06 is no Tolerances: write tolerances=Tolerances\(rtol=1e-06\)",
+        ),
     ],
 )
 def test_questions_that_cannot_be_answered_are_refused(data, options, error, message):
     with pytest.raises(error, match=message):
         hm.verify(BouncingBall(), data, **options)
+
+
+@pytest.mark.parametrize("given", [BouncingBall, "BouncingBall", None])
+def test_only_an_instance_is_verified(given):
+    remedy = r"write BouncingBall\(\)\." if given is BouncingBall else "give an instance of a HybridAutomaton"
+    with pytest.raises(hm.DeclarationError, match=rf"verify was given .*: {remedy}"):
+        hm.verify(given, ball_by_hand())
 
 
 @pytest.mark.parametrize("wrong", [{"time": 0.0}, {"rtol": -1.0}, {"atol": np.nan}])
