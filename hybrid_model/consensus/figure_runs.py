@@ -16,12 +16,18 @@ from matplotlib.ticker import MaxNLocator
 
 from hybrid_model.arc import HybridArc
 from hybrid_model.consensus.figures import COLUMN, plot_broadcasts, plot_error_against_threshold
-from hybrid_model.consensus.metrics import gap_statistics
+from hybrid_model.consensus.metrics import States, disagreement, gap_statistics
 from hybrid_model.consensus.network import agent_name, edges_of
 from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.plots import COLORS, new_axes, plot_inter_event_times
 
-__all__ = ["plot_all_errors", "plot_broadcasts_and_weights", "plot_gap_histogram", "plot_gaps_against_bounds"]
+__all__ = [
+    "plot_all_errors",
+    "plot_broadcasts_and_weights",
+    "plot_disagreement",
+    "plot_gap_histogram",
+    "plot_gaps_against_bounds",
+]
 
 DASHES = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), "solid", (0, (3, 1, 1, 1, 1, 1)))
 """Line styles of bounds, so that they can be told apart without colour as well."""
@@ -187,6 +193,40 @@ def plot_gap_histogram(
     ax.set_ylabel("number")
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.3)
+    return ax
+
+
+def plot_disagreement(
+    scenario: Scenario, runs: Mapping[str, States], level: float | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw ``||x - mean(x) 1||`` of several runs of one network over time, on a logarithmic axis.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran: its stop time counts.
+    runs : mapping
+        Name -> states, from `hybrid_model.consensus.metrics.run_states` or `PeriodicRun.at`.
+    level : float, optional
+        Of the settling time, drawn as a line.
+    ax : Axes, optional
+        Where to draw.
+    """
+    ax = new_axes(ax)
+    times = np.linspace(0.0, scenario.stop_time, 1001)
+    for (name, states), style in zip(runs.items(), ["solid", *_cycled(len(runs))], strict=False):
+        values = disagreement(states(times))
+        ax.plot(times, np.where(values > 0, values, math.nan), linestyle=style, label=name)
+    if level is not None:
+        ax.axhline(level, color="0.5", linewidth=0.7, zorder=0, label="settled")
+    ax.set_yscale("log")
+    ax.set_xlim(0.0, scenario.stop_time)
+    ax.set_xlabel("time $t$ (s)")
+    ax.set_ylabel(r"disagreement $\|x - \bar{x}\mathbf{1}\|$")
+    handles = len(ax.get_legend_handles_labels()[0])
+    ax.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.3, ncols=2 if handles > 2 else 1, handlelength=1.8
+    )
     return ax
 
 

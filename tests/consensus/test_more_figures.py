@@ -15,6 +15,7 @@ from fmu.compiled import compiled
 from hybrid_model.consensus.figure_runs import (
     plot_all_errors,
     plot_broadcasts_and_weights,
+    plot_disagreement,
     plot_gap_histogram,
     plot_gaps_against_bounds,
 )
@@ -25,7 +26,9 @@ from hybrid_model.consensus.figure_sweeps import (
     plot_rate_against,
 )
 from hybrid_model.consensus.figures import COLUMN
+from hybrid_model.consensus.metrics import run_states
 from hybrid_model.consensus.network import closed_loop, edges_of
+from hybrid_model.consensus.periodic_run import periodic_run
 from hybrid_model.consensus.report import run_report
 from hybrid_model.consensus.scenario import load_scenario
 from hybrid_model.plots import JOURNAL
@@ -101,6 +104,18 @@ def test_gaps_and_bounds(run, ax):
     low, high = ax.get_ylim()
     assert low < 1e-6
     assert high > max(np.max(np.diff(row), initial=0.0) for row in times)
+
+
+def test_disagreement_of_runs_side_by_side(run, ax):
+    scenario, arc, _ = run
+    periodic = periodic_run(scenario, 0.5)
+    plot_disagreement(scenario, {"static": run_states(scenario, arc), "periodic": periodic.at}, 0.1, ax)
+    assert labels(ax) == ["static", "periodic", "settled"]
+    start = np.std([1.0, 2.0, 0.3, 0.4]) * 2  # of four agents: sqrt(4) times the standard deviation
+    for name in ("static", "periodic"):
+        assert line(ax, name).get_ydata()[0] == pytest.approx(start)
+    last = periodic.at(np.array([scenario.stop_time]))[:, 0]
+    assert line(ax, "periodic").get_ydata()[-1] == pytest.approx(np.linalg.norm(last - last.mean()))
 
 
 def test_histogram_counts_every_gap(run, ax):
