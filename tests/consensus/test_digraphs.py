@@ -37,16 +37,16 @@ def assert_contraction_holds(seed):
 
 
 def test_contraction_holds_in_a_random_search():
-    """Seeds 0 to 119; the long test goes on to 2499."""
-    cases = [assert_contraction_holds(seed) for seed in range(120)]
+    """Seeds 0 to 59; the long test goes on to 2499."""
+    cases = [assert_contraction_holds(seed) for seed in range(60)]
     # The search is not idle: many cases contract by the bound, and many have no excitation in some direction.
-    assert sum(bound < 0.99 for _, bound in cases) > 15
-    assert sum(bound == 1.0 for _, bound in cases) > 1
+    assert sum(bound < 0.99 for _, bound in cases) > 8
+    assert sum(bound == 1.0 for _, bound in cases) > 0
 
 
 @pytest.mark.long
 def test_contraction_holds_in_a_long_random_search():
-    for seed in range(120, 2500):
+    for seed in range(60, 2500):
         assert_contraction_holds(seed)
 
 
