@@ -15,6 +15,7 @@ import numpy as np
 
 from fmu.trace import Trace, trace
 from hybrid_model import Automaton, Values
+from hybrid_model.automaton import require_automaton
 from hybrid_model.transitions import Assignments
 from hybrid_model.variables import FloatArray, Kind, Value
 from hybrid_model.vector_form import VectorForm
@@ -38,6 +39,7 @@ def compiled(automaton: Automaton) -> Automaton:
     TraceError
         As in `fmu.trace.trace`.
     """
+    require_automaton(automaton)
     return _Compiled(automaton)
 
 

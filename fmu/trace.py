@@ -19,6 +19,8 @@ from hybrid_model.layout import Layout
 from hybrid_model.transitions import Assignments, Trigger
 from hybrid_model.variables import Kind, Variable
 
+_COMPARISONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR)
+
 
 @dataclass(frozen=True, eq=False)
 class Trace:
@@ -158,6 +160,11 @@ class _Tracer:
                 raise TraceError(
                     f"{what} of {self.automaton.name} has {len(given)} margins: join them to one number by least "
                     "(intersection) or greatest (union)."
+                )
+            if any(ca.SX(given[0]).is_op(operation) for operation in _COMPARISONS):
+                raise TraceError(
+                    f"{what} of {self.automaton.name} is a comparison: return a margin instead, a number that is "
+                    "zero or above inside the set (for h <= 0 return -h; join by least for 'and', greatest for 'or')."
                 )
             elements += given
         return ca.vertcat(*elements) if elements else ca.SX(0, 1)

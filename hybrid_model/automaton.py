@@ -84,6 +84,10 @@ class Automaton(ABC):
     def output_values(self, s: Values) -> Assignments:
         """Return the values of the computed outputs."""
 
+    def output_value(self, name: str, s: Values) -> Value:
+        """Return the value of one computed output; a composition computes only what that one needs."""
+        return self.output_values(s)[name]
+
     def of_kind(self, *kinds: Kind) -> list[Variable]:
         """Return the variables of the given kinds, in declaration order."""
         return [v for v in self.variables if v.kind in kinds]
@@ -244,10 +248,10 @@ class HybridAutomaton(Automaton):
         return values
 
     def _margin(self, what: str, margin: Value) -> Value:
-        if isinstance(margin, (bool, np.bool_)):
+        if _is_indicator(margin):
             raise DeclarationError(
-                f"{what} of {self.name} is a boolean: return a margin instead, a number that is zero or above inside "
-                "the set (for h <= 0 return -h; join conditions with least for 'and', greatest for 'or')."
+                f"{what} of {self.name} is {_kind_of(margin)}: return a margin instead, a number that is zero or above "
+                "inside the set (for h <= 0 return -h; join conditions with least for 'and', greatest for 'or')."
             )
         if margin is None:
             raise DeclarationError(f"{what} of {self.name} is None: return a margin, zero or above inside the set.")
@@ -257,6 +261,31 @@ class HybridAutomaton(Automaton):
                 "np.min for 'all of them', np.max for 'any of them'."
             )
         return margin
+
+
+def require_automaton(given: Automaton) -> None:
+    """Refuse what is no automaton, such as a class instead of an instance.
+
+    Raises
+    ------
+    DeclarationError
+        With what to write.
+    """
+    if isinstance(given, type):
+        raise DeclarationError(f"{given.__name__} is a class: make an instance of it, {given.__name__}().")
+    if not isinstance(given, Automaton):
+        raise DeclarationError(f"{given!r} is not an automaton: give a HybridAutomaton or a Composition.")
+
+
+def _is_indicator(margin: Value) -> bool:
+    """Whether a margin says yes or no only: values of states are floats, so whole numbers come from conditions."""
+    if isinstance(margin, (bool, int, np.bool_, np.integer)):
+        return True
+    return isinstance(margin, np.ndarray) and margin.dtype.kind in "biu"
+
+
+def _kind_of(margin: Value) -> str:
+    return "a boolean" if np.asarray(margin).dtype.kind == "b" else f"the whole number {margin}"
 
 
 def _declared(cls: type, kind: type) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid_model.automaton import Automaton
+from hybrid_model.automaton import Automaton, require_automaton
 from hybrid_model.errors import AlgebraicLoopError, DeclarationError, WiringError
 from hybrid_model.layout import Layout
 from hybrid_model.transitions import Assignments, ClockInfo, JumpInfo, Priority, Trigger
@@ -76,6 +76,8 @@ class Composition(Automaton):
     ) -> None:
         self.name = name
         self.parts = dict(parts)
+        for automaton in self.parts.values():
+            require_automaton(automaton)
         self._wires: dict[str, dict[str, _Wire]] = {part: {} for part in self.parts}
         for (part, variable), wire in _wires(self, connections or {}).items():
             self._wires[part][variable] = wire
@@ -99,7 +101,10 @@ class Composition(Automaton):
         self._with_states = [(p, a) for p, a in self.parts.items() if a.of_kind(Kind.STATE)]
         self._with_guards = [(p, a) for p, a in self.parts.items() if any(j.trigger is Trigger.STATE for j in a.jumps)]
         self._with_times = [(p, a) for p, a in self.parts.items() if any(j.trigger is Trigger.TIME for j in a.jumps)]
-        self._computed = {(p, v.name) for p, automaton in self.parts.items() for v in automaton.of_kind(Kind.OUTPUT)}
+        self._computed = {
+            (p, v.name): None for p, automaton in self.parts.items() for v in automaton.of_kind(Kind.OUTPUT)
+        }
+        self._computed_by_name = {self._names[owner]: owner for owner in self._computed}
         self._owner = [(part, k) for part, automaton in self.parts.items() for k in range(len(automaton.jumps))]
         self.jumps = tuple(
             JumpInfo(f"{part}.{info.name}", info.trigger, info.internal)
@@ -165,11 +170,11 @@ class Composition(Automaton):
     def output_values(self, s: Values) -> Assignments:
         """See `Automaton.output_values`."""
         scopes = _Scopes(self, s)
-        values: dict[str, Value] = {}
-        for part, automaton in self.parts.items():
-            if automaton.of_kind(Kind.OUTPUT):
-                values.update(self._scoped(part, scopes.outputs(part)))
-        return values
+        return {self._names[part, output]: scopes.output(part, output) for part, output in self._computed}
+
+    def output_value(self, name: str, s: Values) -> Value:
+        """See `Automaton.output_value`."""
+        return _Scopes(self, s).output(*self._computed_by_name[name])
 
     def part_values(self, part: str, s: Values) -> Values:
         """Return the values of one part, inputs over wires included, out of those of the composition."""
@@ -220,19 +225,28 @@ class _Scopes:
             self._parts[part] = _PartValues(self._composition, part, self, self._s)
         return self._parts[part]
 
-    def outputs(self, part: str) -> Assignments:
-        """Return the computed outputs of one part."""
-        if part not in self._outputs:
-            if part in self._computing:
-                loop = " -> ".join([*self._computing[self._computing.index(part) :], part])
+    def output(self, part: str, variable: str) -> Value:
+        """Return one computed output of a part.
+
+        A part that is a composition computes only what the output needs, so that nesting makes no loop of what is none.
+        """
+        automaton = self._composition.parts[part]
+        nested = isinstance(automaton, Composition)
+        place = f"{part}.{variable}" if nested else part
+        if place not in self._outputs:
+            if place in self._computing:
+                loop = " -> ".join([*self._computing[self._computing.index(place) :], place])
                 raise AlgebraicLoopError(
                     f"{self._composition.name}: the outputs of {loop} need each other at one instant: put a state "
                     "between them, or leave the input out of the outputs."
                 )
-            self._computing.append(part)
-            self._outputs[part] = self._composition.parts[part].output_values(self.of(part))
+            self._computing.append(place)
+            s = self.of(part)
+            self._outputs[place] = (
+                {variable: automaton.output_value(variable, s)} if nested else automaton.output_values(s)
+            )
             self._computing.pop()
-        return self._outputs[part]
+        return self._outputs[place][variable]
 
     def wired(self, wire: _Wire) -> Value:
         """Return the value that arrives over a wire."""
@@ -243,7 +257,7 @@ class _Scopes:
 
     def _source(self, part: str, variable: str) -> Value:
         if (part, variable) in self._composition._computed:
-            return self.outputs(part)[variable]
+            return self.output(part, variable)
         return self._s[self._composition._names[part, variable]]
 
 
@@ -345,14 +359,20 @@ def _scoped_names(composition: Composition, given: Mapping[str, str]) -> dict[tu
 
 
 def _common_priority(composition: Composition) -> Priority:
-    priorities = {
-        automaton.priority
-        for automaton in composition.parts.values()
+    jumping = {
+        part: automaton.priority
+        for part, automaton in composition.parts.items()
         if any(info.trigger is Trigger.STATE for info in automaton.jumps)
     }
+    priorities = set(jumping.values())
     if len(priorities) > 1:
         raise WiringError(
             f"{composition.name}: some parts let the jump win where flow set and jump set overlap and some the flow: "
             "give all parts with jumps the same priority."
+        )
+    if Priority.FLOW in priorities and len(jumping) > 1:
+        raise WiringError(
+            f"{composition.name}: {' and '.join(jumping)} jump on state, and under flow priority each would jump when "
+            "another leaves its flow set: give them jump priority, or let only one part of a composition jump on state."
         )
     return priorities.pop() if priorities else Priority.JUMP

@@ -101,12 +101,17 @@ def simulate_network(
         raise SimulationError(
             f"the end time is {t_end} s and the start {t_start} s: give finite times, the end not before the start."
         )
+    if not isinstance(network, Composition):
+        raise WiringError(
+            f"simulate_network runs the parts of a Composition, and {network!r} is none: use simulate; to run faster, "
+            "compile the parts and not the whole."
+        )
     _require_discrete(network)
     blocks = _blocks(network, t_start, t_end, inputs or {}, solver or Solver(), zeno or ZenoGuard())
     wires: dict[str, list[ElementWire]] = {part: [] for part in network.parts}
     for wire in network.wires:
         wires[wire.source].append(wire)
-    scheduler = Scheduler(blocks, wires.__getitem__, t_start)
+    scheduler = Scheduler(blocks, wires.__getitem__, t_start, (solver or Solver()).event_tolerance)
     for block in blocks.values():
         block.begin()
     scheduler.handle_events(t_start, blocks)

@@ -225,7 +225,20 @@ class Execution:
         if np.isnan(table).any():
             at = int(np.isnan(table).any(axis=1).argmax())
             self._require_margins(table[at], float(times[at]))
+        if (table == 0.0).any():
+            self._refuse_indicators(table)
         return table
+
+    def _refuse_indicators(self, table: FloatArray) -> None:
+        indicators = ((table == 0.0) | (table == 1.0)).all(axis=0) & (table.min(axis=0) < table.max(axis=0))
+        if indicators.any():
+            row = int(indicators.argmax())
+            guards = [info.name for info in self.automaton.jumps if info.trigger is Trigger.STATE]
+            whose = f"jump {guards[row]!r}" if row < self.guards else "the flow set"
+            raise SimulationError(
+                f"{self.automaton.name}: the margin of {whose} is 0 or 1 along the flow, as if it said no or yes: "
+                "return a number that is zero or above inside the set and negative outside (for h >= 0 return h)."
+            )
 
     def flow_margin(self) -> float:
         """Return the margin of the flow set, which the automaton must have."""

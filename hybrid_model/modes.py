@@ -164,11 +164,17 @@ class ModalAutomaton(HybridAutomaton):
             return {**(switch.reset(self, s) if switch.reset else {}), "mode": target}
 
         if isinstance(switch, TimedSwitch):
-            return TimeEvent(
-                switch.name, lambda self, s: np.where(s.mode == source, switch.time(self, s), np.inf), jump_map
-            )
+
+            def time(self: ModalAutomaton, s: Values) -> Value:
+                if _is_number(s.mode):
+                    return switch.time(self, s) if s.mode == source else np.inf
+                return np.where(s.mode == source, switch.time(self, s), np.inf)
+
+            return TimeEvent(switch.name, time, jump_map)
 
         def jump_set(self: ModalAutomaton, s: Values) -> Value:
+            if _is_number(s.mode) and s.mode != source:
+                return -0.5
             guard = self._margin(f"the guard of {switch.name!r}", switch.guard(self, s))
             return least(guard, 0.5 - np.abs(s.mode - source))
 

@@ -73,6 +73,8 @@ class Scheduler:
         Name of a block -> the wires that leave it. All carry signals that change only at events.
     t_start : float
         Time in s.
+    tolerance : float
+        In s: events of different blocks closer than this are handled at one instant.
 
     Attributes
     ----------
@@ -87,13 +89,18 @@ class Scheduler:
     """
 
     def __init__(
-        self, blocks: Mapping[str, Block], wires_from: Callable[[str], Iterable[Wire]], t_start: float
+        self,
+        blocks: Mapping[str, Block],
+        wires_from: Callable[[str], Iterable[Wire]],
+        t_start: float,
+        tolerance: float = SIMULTANEOUS,
     ) -> None:
         self.t = t_start
         self.ticks: list[Tick] = []
         self.steps = 0
         self.ended: tuple[str, float, Termination] | None = None
         self._wires_from = wires_from
+        self._tolerance = tolerance
         self._places = {name: _Place(block, k, t_start) for k, (name, block) in enumerate(blocks.items())}
         self._unpredictable: set[str] = set()
         self._queue: list[tuple[float, int, int, str]] = []
@@ -176,7 +183,7 @@ class Scheduler:
 
     def _require_announced(self, place: _Place, t: float) -> None:
         """Refuse a stop before `t`; within the tolerance before it, it is rounding."""
-        if place.t < t - SIMULTANEOUS and not self.ended:
+        if place.t < t - self._tolerance and not self.ended:
             raise SchedulingError(
                 f"{place.block.name} stopped at t = {place.t:.12g} s for an event that it had not announced, on the "
                 f"way to {t:.12g} s: its nextEventTime is wrong."
@@ -185,7 +192,7 @@ class Scheduler:
     def _step(self, place: _Place, t: float) -> Step:
         made = place.block.step(place.t, t)
         self.steps += 1
-        if made.reached < place.t or made.reached > t + SIMULTANEOUS:
+        if made.reached < place.t or made.reached > t + self._tolerance:
             raise SchedulingError(
                 f"{place.block.name} stepped from {place.t:.12g} towards {t:.12g} s and says that it is at "
                 f"{made.reached:.12g} s: that is outside the step."
@@ -217,9 +224,9 @@ class Scheduler:
         stopped = self._watch_unpredictable(first)
         if stopped:
             first = min(place.t for place in stopped)
-        due = {place.block.name for place in stopped if place.t <= first + SIMULTANEOUS}
+        due = {place.block.name for place in stopped if place.t <= first + self._tolerance}
         instant = first
-        while self._queue and self._queue[0][0] <= min(first + SIMULTANEOUS, limit):
+        while self._queue and self._queue[0][0] <= min(first + self._tolerance, limit):
             time, _, _, name = heapq.heappop(self._queue)
             instant = max(instant, time)
             due.add(name)
@@ -255,11 +262,11 @@ class Scheduler:
                     return []
             first = min((place.t for place in stopped), default=horizon)
             for place, t, state in saved:
-                if place.t > first + SIMULTANEOUS:
+                if place.t > first + self._tolerance:
                     place.block.restore(state)
                     place.t = t
                     self._step(place, first)
         finally:
             for place, _, state in saved:
                 place.block.release(state)
-        return [place for place in stopped if place.t <= first + SIMULTANEOUS]
+        return [place for place in stopped if place.t <= first + self._tolerance]

@@ -118,7 +118,8 @@ class ZenoMonitor:
             return (
                 f"{automaton}: {count} jumps of {jump!r} at one instant, t = {t:.9g} s: after the jump the state is "
                 "still in the jump set. Make the jump map leave the jump set, or let the margin be negative there "
-                "(a threshold that is zero together with its error fires for ever)."
+                "(a threshold that is zero together with its error fires for ever; so does a set given as 0 outside "
+                "and 1 inside, because zero is inside)."
             )
         if not on_state:
             return None

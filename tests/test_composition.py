@@ -282,4 +282,71 @@ def test_parts_with_jumps_must_agree_on_the_priority():
         hm.WiringError, match=r"mixed: some parts let the jump win .* give all parts with jumps the same"
     ):
         hm.Composition("mixed", {"a": BouncingBall(), "b": Patient()})
-    assert hm.Composition("alike", {"a": Patient(), "b": Patient(), "c": Gain()}).priority is hm.Priority.FLOW
+    assert hm.Composition("alike", {"a": Patient(), "c": Gain()}).priority is hm.Priority.FLOW
+
+
+class _Follower(hm.HybridAutomaton):
+    """y = x, whatever u."""
+
+    u = hm.Input(0.0)
+    x = hm.State(1.0)
+    y = hm.Output()
+
+    def flow_map(self, s):
+        return {"x": s.u - s.x}
+
+    def outputs(self, s):
+        return {"y": s.x}
+
+
+class _Doubling(hm.HybridAutomaton):
+    u = hm.Input(0.0)
+    y = hm.Output()
+
+    def outputs(self, s):
+        return {"y": 2.0 * s.u}
+
+
+def test_nesting_makes_no_algebraic_loop_of_a_chain():
+    """a -> c -> b, with a and b nested in one composition: the outputs of a do not need what b needs."""
+    flat = hm.Composition("flat", {"a": _Follower(), "c": _Doubling(), "b": _Doubling()}, {"c.u": "a.y", "b.u": "c.y"})
+    inner = hm.Composition("inner", {"a": _Follower(), "b": _Doubling()})
+    nested = hm.Composition("nested", {"inner": inner, "c": _Doubling()}, {"c.u": "inner.a.y", "inner.b.u": "c.y"})
+    one, other = hm.simulate(flat, 1.0), hm.simulate(nested, 1.0)
+    assert one.at("b.y", 1.0) == other.at("inner.b.y", 1.0) == pytest.approx(4.0 * np.exp(-1.0), abs=1e-12)
+
+
+def test_a_real_loop_through_a_nested_composition_is_still_refused():
+    inner = hm.Composition("inner", {"a": _Doubling(), "b": _Doubling()}, {"b.u": "a.y"})
+    with pytest.raises(hm.AlgebraicLoopError, match=r"inner\.b\.y -> c -> inner\.b\.y|c -> inner\.b\.y -> c"):
+        hm.Composition("nested", {"inner": inner, "c": _Doubling()}, {"c.u": "inner.b.y", "inner.a.u": "c.y"})
+
+
+def test_several_parts_with_flow_priority_are_refused():
+    class Late(hm.HybridAutomaton):
+        priority = hm.Priority.FLOW
+        x = hm.State(0.0)
+
+        def flow_map(self, s):
+            return {"x": 1.0}
+
+        def flow_set(self, s):
+            return 2.0 - s.x
+
+        def jump_set(self, s):
+            return s.x - 1.0
+
+        def jump_map(self, s):
+            return {"x": 0.0}
+
+    with pytest.raises(hm.WiringError, match="a and b jump on state, and under flow priority"):
+        hm.Composition("two", {"a": Late(), "b": Late()})
+    assert len(hm.simulate(hm.Composition("one", {"a": Late()}), 5.0).jumps) == 2
+
+
+@pytest.mark.parametrize(
+    ("part", "words"), [(_Doubling, r"_Doubling is a class: make an instance"), (3, "3 is not an")]
+)
+def test_what_is_no_automaton_is_refused(part, words):
+    with pytest.raises(hm.DeclarationError, match=words):
+        hm.Composition("broken", {"a": part})

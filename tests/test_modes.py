@@ -151,3 +151,15 @@ def test_maps_of_other_modes_need_not_be_defined_in_a_run():
 def test_mistakes_are_answered_by_name(build, words):
     with pytest.raises(hm.HybridModelError, match=re.escape(words)):
         build()
+
+
+def test_a_guard_need_not_be_defined_in_other_modes():
+    class Logarithm(hm.ModalAutomaton):
+        x = hm.State(1.0)
+        modes = (hm.Mode("a", lambda self, s: {"x": 1.0}), hm.Mode("b", lambda self, s: {"x": 1.0}))
+        switches = (
+            hm.Switch("on", "a", "b", lambda self, s: s.x - 2.0),
+            hm.Switch("back", "b", "a", lambda self, s: np.log(s.x - 1.5), lambda self, s: {"x": 0.0}),
+        )
+
+    assert [jump.t for jump in hm.simulate(Logarithm(), 2.0).jumps] == pytest.approx([1.0, 1.5], abs=1e-13)
