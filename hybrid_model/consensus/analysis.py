@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 from hybrid_model.consensus.certificates import default_window
 from hybrid_model.consensus.excitation import ExcitationConstants, Signal, scenario_excitation
 from hybrid_model.consensus.floquet import FloquetSpectrum, floquet_spectrum
-from hybrid_model.consensus.flow_cells import FlowCells, flow_cells
+from hybrid_model.consensus.flow_cells import FlowCells, affordable_resolution, flow_cells
 from hybrid_model.consensus.graphs import disagreement_basis, incidence
 from hybrid_model.consensus.reachable_sets import ReachableSets
 from hybrid_model.consensus.scenario_data import Scenario
@@ -159,7 +159,8 @@ class Analysis:
     @cached_property
     def cells(self) -> FlowCells:
         """The flow over one cycle from t = 0, on a coarse grid."""
-        return flow_cells(self.scenario, 0.0, self.cycle, max(self.resolution, 0.02))
+        resolution = affordable_resolution(self.scenario, 0.0, self.cycle, max(self.resolution, 0.02), 6000)
+        return flow_cells(self.scenario, 0.0, self.cycle, resolution)
 
     def moved_degrees(self) -> NDArray[np.intp]:
         """Number of edges of each agent that ever carry weight, shape (n,)."""

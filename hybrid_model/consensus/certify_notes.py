@@ -99,7 +99,7 @@ def _corollary(analysis: Analysis) -> Iterator[str]:
 
 def _radius_notes(bounds: Bounds) -> Iterator[str]:
     scenario = bounds.analysis.scenario
-    found = tree_radii(bounds.analysis)
+    found = tree_radii(bounds.analysis) if bounds.parts and scenario.trigger.threshold > 0 else []
     if len(found) > 1:
         least, most = min(found, key=lambda t: t.kappa2), max(found, key=lambda t: t.kappa2)
         best = min(found, key=lambda t: t.radius)
@@ -127,14 +127,15 @@ def _radius_notes(bounds: Bounds) -> Iterator[str]:
 def _refuted(bounds: Bounds, seen: Observation | None) -> Iterator[str]:
     """Printed numbers that this very scenario contradicts, and those that are wrong in general."""
     printed, valid = bounds.printed, bounds.valid
-    if printed.rate > valid.rate > 0:
+    if printed.rate > valid.rate * (1 + 1e-9) > 0:
         yield (
             f"The printed rate {printed.rate:.6g}/s uses mu2 of W_tau where the proof needs mu2 of M; with that it is "
             f"{valid.rate:.6g}/s (audit, section 3)."
         )
     if bounds.floquet_rate is not None and printed.rate > bounds.floquet_rate * (1 + 1e-9):
         yield f"The printed rate {printed.rate:.6g}/s is false here: the Floquet rate is {bounds.floquet_rate:.6g}/s."
-    if bounds.analysis.scenario.trigger.kind not in PAPER_LAWS:
+    scenario = bounds.analysis.scenario
+    if scenario.trigger.kind not in PAPER_LAWS or not scenario.channel.ideal:
         return
     gap = bounds.printed_gap
     if gap is not None and printed.kappa1 is not None and printed.kappa1 < 0:

@@ -89,7 +89,8 @@ def initial_peaks(analysis: Analysis, decay: float) -> tuple[float, NDArray[np.f
     edges = basis.T @ np.hstack([incidence(network.agents, e) for e in (network.edges, network.underlying_edges)])
     listed = len(network.edges)
     lengths = np.where(cells.is_idle, 0.0, np.diff(cells.times))
-    bulge = (1 + max(analysis.resolution, 0.02) ** 2) * math.exp(decay * float(np.max(lengths)))
+    finest = max(float(np.max(cells.doses.sum(axis=1))) * 2 * network.gain, 0.02)
+    bulge = (1 + min(finest, 1.0) ** 2) * math.exp(decay * float(np.max(lengths)))
     path, state = np.empty((len(cells.flows) + 1, basis.shape[1])), analysis.initial_disagreement
     pairs, norm, start, least = np.zeros(listed), 0.0, 0.0, _FORGOTTEN * float(np.linalg.norm(state))
     for _ in range(_MOST_CYCLES):

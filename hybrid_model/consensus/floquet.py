@@ -46,12 +46,16 @@ def floquet_spectrum(scenario: Scenario) -> FloquetSpectrum:
             "the weights have no common period, so there is no monodromy matrix; "
             "choose rates and a dwell time whose quotients are simple fractions."
         )
-    # Every number is a period of a constant: take one second.
-    length = period if period > 0 else 1.0
-    monodromy = transition_matrix(scenario, 0.0, length)
-    multipliers = np.linalg.eigvals(monodromy).astype(complex)
+    if period == 0.0:
+        # Every number is a period of a constant: take one second. The rate is an eigenvalue, however small e^{-rate}.
+        factor, weights = signal_factor(scenario, Signal.DISAGREEMENT), scenario.edge_weights.value(0.0)
+        rates = scenario.network.gain * np.maximum(np.linalg.eigvalsh((factor * weights) @ factor.T), 0.0)
+        return FloquetSpectrum(1.0, np.exp(-rates).astype(complex), float(rates[0]))
+    multipliers = np.linalg.eigvals(transition_matrix(scenario, 0.0, period)).astype(complex)
     multipliers = multipliers[np.argsort(-np.abs(multipliers))]
-    return FloquetSpectrum(length, multipliers, float(-np.log(np.abs(multipliers[0])) / length))
+    # A multiplier below the smallest float counts as that: the rate is then a lower bound.
+    largest = max(float(np.abs(multipliers[0])), float(np.finfo(float).tiny))
+    return FloquetSpectrum(period, multipliers, -float(np.log(largest)) / period)
 
 
 def transition_matrix(scenario: Scenario, t0: float, t1: float) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from hybrid_model.consensus.edge_weights import Piece
 from hybrid_model.consensus.excitation import Signal, signal_factor
 from hybrid_model.consensus.scenario_data import Scenario
 
-__all__ = ["FlowCells", "flow_cells"]
+__all__ = ["FlowCells", "affordable_resolution", "flow_cells"]
 
 _MOST_PER_PIECE = 20_000
 
@@ -79,13 +79,23 @@ def flow_cells(scenario: Scenario, t0: float, t1: float, resolution: float, long
     return FlowCells(np.concatenate(cuts), np.concatenate(flows), np.concatenate(doses))
 
 
+def affordable_resolution(scenario: Scenario, t0: float, t1: float, resolution: float, most: int) -> float:
+    """`resolution`, or what leaves about `most` cells between `t0` and `t1` [s] if the weights are so large."""
+    factor, gain = signal_factor(scenario, Signal.DISAGREEMENT), scenario.network.gain
+    spent = sum(_spent(piece, gain, factor) for piece in scenario.edge_weights.pieces(t0, t1) if not piece.is_idle)
+    return max(resolution, spent / most)
+
+
+def _spent(piece: Piece, gain: float, factor: NDArray[np.float64]) -> float:
+    dose = piece.amplitudes * np.array([float(c.integral(piece.start, piece.end)) for c in piece.carriers])
+    return gain * float(np.linalg.eigvalsh((factor * dose) @ factor.T)[-1])
+
+
 def _count(piece: Piece, gain: float, factor: NDArray[np.float64], resolution: float, longest: float) -> int:
     if piece.is_idle:
         return 1
     length = piece.end - piece.start
-    dose = piece.amplitudes * np.array([float(c.integral(piece.start, piece.end)) for c in piece.carriers])
-    spent = gain * float(np.linalg.eigvalsh((factor * dose) @ factor.T)[-1])
-    steps = max(spent / resolution, length / longest)
+    steps = max(_spent(piece, gain, factor) / resolution, length / longest)
     if piece.shared_carrier is None:
         # The Magnus series needs carriers that are smooth over a cell: 64 cells a half wave make its error negligible.
         steps = max(steps, 64 * length * max(_rate(carrier) for carrier in piece.carriers) / np.pi)

@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_model.consensus.flow_cells import FlowCells, flow_cells
+from hybrid_model.consensus.flow_cells import FlowCells, affordable_resolution, flow_cells
 from hybrid_model.consensus.graphs import disagreement_basis, incidence
 from hybrid_model.consensus.scenario_data import Scenario
 
@@ -30,6 +30,9 @@ _APART = 0.5
 _STALLED = 1e-10
 _TAIL = 1e-11
 _MOST_CYCLES = 20_000
+_MOST_CELLS = 6000
+_MOST_TIMES = 400
+_MOST_STARTS = 1500
 _CHUNK = 4_000_000
 """Numbers in the largest temporary array."""
 
@@ -56,10 +59,11 @@ class ReachableSets:
         self, scenario: Scenario, period: float, decay: float, resolution: float, *, periodic: bool = True
     ) -> None:
         """Cut one period into cells."""
-        self._periodic, self._resolution = periodic, resolution
+        self._periodic = periodic
+        resolution = affordable_resolution(scenario, 0.0, period, resolution, _MOST_CELLS)
         longest = resolution / decay if decay > 0 else np.inf
         self._cells: FlowCells = flow_cells(scenario, 0.0, period, resolution, longest)
-        self._period, self._decay = period, decay
+        self._period, self._decay, self._resolution = period, decay, resolution
         network = scenario.network
         self._basis = disagreement_basis(network.agents)
         self._edge_form = self._basis.T @ incidence(network.agents, network.underlying_edges)
@@ -153,13 +157,14 @@ class ReachableSets:
             return np.zeros(1, dtype=np.intp)
         cuts = np.append(scenario.edge_weights.breakpoints(0.0, self._period), self._period)
         ends = np.concatenate(([0], np.searchsorted(self._cells.times, cuts * (1 - 1e-12))))
-        step = max(1, round(_APART / self._resolution))
+        step = max(1, round(_APART / self._resolution), len(self.times) // _MOST_TIMES)
         return np.unique(np.concatenate([np.arange(a, b, step) for a, b in pairwise(ends)])).astype(np.intp)
 
     def contraction(self) -> float:
         """Largest ``||phi(t + P, t)||`` over the grid of times."""
         count, size = len(self._cells.flows), self._basis.shape[1]
-        flow, places = np.broadcast_to(np.eye(size), (count, size, size)), np.arange(count)
+        places = np.arange(0, count, max(1, count // _MOST_STARTS))
+        flow = np.broadcast_to(np.eye(size), (len(places), size, size))
         for j in range(count):
             flow = self._cells.flows[(places + j) % count] @ flow
         return float(np.max(np.linalg.norm(flow, 2, axis=(1, 2))))
@@ -169,11 +174,14 @@ class ReachableSets:
         cells = self._cells
         count, size = len(cells.flows), self._basis.shape[1]
         lengths = np.diff(cells.times)
-        flow, places, ages = np.broadcast_to(np.eye(size), (count, size, size)), np.arange(count), np.zeros(count)
+        places = np.arange(0, count, max(1, count // _MOST_STARTS))
+        flow, ages = np.broadcast_to(np.eye(size), (len(places), size, size)), np.zeros(len(places))
         largest = 1.0
         for j in range(2 * count):
             flow, ages = cells.flows[(places + j) % count] @ flow, ages + lengths[(places + j) % count]
-            largest = max(largest, float(np.max(np.linalg.norm(flow, 2, axis=(1, 2)) * np.exp(rate * ages))))
+            largest = max(
+                largest, float(np.max(np.linalg.norm(flow, 2, axis=(1, 2)) * np.exp(np.minimum(rate * ages, 700.0))))
+            )
         return largest
 
 
