@@ -95,6 +95,11 @@ class Symbols(np.ndarray[Any, np.dtype[Any]]):
         options = {key: value for key, value in options.items() if key in ("axis", "keepdims")}
         if given[0].size == 0 and ufunc in _IDENTITY:
             return symbols(np.full((), _IDENTITY[ufunc], dtype=object))
+        whole = method == "reduce" and options.get("axis", 0) is None
+        # numpy reduces one axis at a time with functions that it does not know to be commutative.
+        if whole and given[0].ndim > 1:
+            reduced = elementwise.reduce(given[0].ravel())
+            return symbols(reduced.reshape((1,) * given[0].ndim) if options.get("keepdims") else reduced)
         return symbols(getattr(elementwise, method)(given[0], **options))
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:

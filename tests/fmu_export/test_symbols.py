@@ -6,8 +6,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import hybrid_model as hm
 from fmu.errors import TraceError
 from fmu.symbols import expressions, symbol_vector
+from fmu.trace import trace
 
 FUNCTIONS = {
     "arithmetic": lambda x, y: (x + y) * x - y / (1.0 + x**2) - 2.0 * x,
@@ -56,3 +58,20 @@ def test_symbols_give_the_numbers_that_numpy_gives(name, x, y):
 def test_what_cannot_be_traced_is_refused_with_what_to_write(attempt, sentence):
     with pytest.raises(TraceError, match=sentence):
         attempt(symbol_vector(ca.SX.sym("x", 3)))
+
+
+@pytest.mark.parametrize("reduce", [np.sum, np.max, np.min, np.prod])
+def test_a_matrix_is_reduced_whole_and_by_axis(reduce):
+    class Reduced(hm.HybridAutomaton):
+        m = hm.Parameter([[1.5, -2.0, 3.0], [4.0, 5.5, -6.0]])
+        whole = hm.Output()
+        kept = hm.Output()
+
+        def outputs(self, s):
+            return {"whole": reduce(s.m), "kept": np.sum(reduce(s.m, axis=1)) + np.sum(reduce(s.m, keepdims=True))}
+
+    automaton = Reduced()
+    run = hm.Execution(automaton)
+    traced = trace(automaton).outputs(0.0, [], [], [], run.p)
+    expected = automaton.output_values(run.values())
+    assert np.asarray(traced).ravel() == pytest.approx([float(expected["whole"]), float(expected["kept"])])
