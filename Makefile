@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+# Threads cost more than they give on matrices of some ten rows.
+export OPENBLAS_NUM_THREADS := 1
 
 .PHONY: run test test-long benchmark lint format clean
 
