@@ -105,7 +105,7 @@ def signals(automaton, steps):
                 [start, *(v for at, v in steps.get(name, ()) if at <= t)][-1]
                 for name, start in zip(names, starts, strict=True)
             ]
-            return np.array(rows) if variable.shape else rows[0]
+            return np.reshape(rows, variable.shape)
 
         if any(name in steps for name in names):
             inputs[variable.name] = hm.Signal(value, sorted({t for name in names for t, _ in steps.get(name, ())}))
