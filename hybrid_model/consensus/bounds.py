@@ -203,8 +203,11 @@ class Bounds:
             return None
         carrier = min(decay for _, decay in parts)
         least = math.inf
+        trigger = self.analysis.scenario.trigger
+        # Sampled checks let errors grow beyond the threshold, and still a broadcast needs an error of the threshold.
+        level = trigger.threshold if trigger.kind is TriggerKind.SAMPLED else None
         for c, decay in parts:
-            gap = part(c, decay, with_initial=decay == carrier)
+            gap = part(c, decay, with_initial=decay == carrier, threshold=level)
             if gap is None:
                 # Errors stay below the sum of all c, thresholds above those that do not decay.
                 lasting = sum(c for c, decay in parts if decay == 0)
@@ -212,8 +215,8 @@ class Bounds:
             if gap is None:
                 return None
             least = min(least, gap)
-        if self.analysis.scenario.trigger.kind is TriggerKind.SAMPLED:
-            least = max(least, self.analysis.scenario.trigger.period)
+        if trigger.kind is TriggerKind.SAMPLED:
+            least = max(least, trigger.period)
         return least if math.isfinite(least) else None
 
     def _valid_part_gap(

@@ -96,7 +96,9 @@ def certify(
         return _in_parts(scenario, arc, general, cycle, resolution)
     analysis = analyse(scenario, tree, window, resolution)
     bounds = Bounds(analysis)
-    seen = None if arc is None else observe(analysis, arc)
+    # Where no radius exists, there is nothing to compare an observed one with.
+    decay = None if bounds.exact_radius is None else min((beta for _, beta in bounds.slowest), default=0.0)
+    seen = None if arc is None else observe(analysis, arc, decay)
     values = certified_values(bounds, seen)
     hypotheses = (*general, *rate_hypotheses(analysis, bounds.printed.rate, bounds.valid.rate, bounds.improved_rate))
     constants = analysis.tree_weights

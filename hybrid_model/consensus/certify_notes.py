@@ -42,6 +42,10 @@ def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
     end = analysis.scenario.stop_time
     if name == "exciting tree":
         return "The tree-free, energy and exact forms need no tree."
+    scenario = analysis.scenario
+    if name.startswith("beta below") and not (scenario.channel.ideal and scenario.trigger.kind in PAPER_LAWS):
+        # What follows is about a threshold c exp(-beta t) on broadcasts that arrive at once.
+        return ""
     if name == "beta below the printed rate":
         return "The printed bound does not exist; the exact form needs no beta below alpha_v."
     if name == "beta below the valid rate":

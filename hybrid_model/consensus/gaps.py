@@ -10,11 +10,15 @@ from scipy.special import lambertw
 
 from hybrid_model.consensus.analysis import Analysis
 from hybrid_model.consensus.edge_weights import EdgeWeights
+from hybrid_model.consensus.scenario_data import WeightKind
 
 __all__ = ["excited_gap", "frozen_gap", "growing_gap", "printed_gap"]
 
 _ACCURACY = 1e-5
 _GRID = 4
+_FINE = 4001
+_CORNERED = (WeightKind.CONSTANT, WeightKind.GATED_SINE)
+"""Weights whose integral over a moving interval is largest at or beside their breakpoints."""
 
 
 def printed_gap(threshold: float, decay: float, speed: float, kappa1: float, kappa2: float) -> float:
@@ -109,7 +113,14 @@ def _moved(weights: EdgeWeights, rates: NDArray[np.float64], analysis: Analysis,
     # Between two starts the integral follows a parabola: the vertex through the best three lies above the grid.
     best = int(np.argmax(values))
     around = slice(max(best - 1, 0), min(best + 2, len(values)))
-    return float(values[best] + _vertex_rise(starts[around], values[around]))
+    largest = float(values[best] + _vertex_rise(starts[around], values[around]))
+    if analysis.scenario.weights.kind in _CORNERED:
+        return largest
+    # Between the corners of other kinds anything may happen: a fine grid, and the most that lies between its points.
+    starts = np.unique(np.append(np.linspace(0.0, last, _FINE), corners))
+    steepest = float(rates @ analysis.largest_weights)
+    between = 0.5 * steepest * float(np.max(np.diff(starts), initial=0.0))
+    return max(largest, float(np.max(weights.integral(starts, starts + length) @ rates)) + between)
 
 
 def _vertex_rise(t: NDArray[np.float64], y: NDArray[np.float64]) -> float:

@@ -31,7 +31,7 @@ class Observation:
     radius : float or None
         Largest ``exp(beta t) (||x_e(t)|| - ||x_e(t) without errors||)`` over the last cycle: what is left once the
         share of the initial state is taken off. Never above the exact worst case. None without a network that reaches
-        consensus.
+        consensus, or a bound on the errors.
     initial_share : float or None
         Largest ``exp(beta t) ||x_e(t) without errors||`` over the last cycle.
     """
@@ -41,7 +41,7 @@ class Observation:
     initial_share: float | None
 
 
-def observe(analysis: Analysis, arc: HybridArc) -> Observation:
+def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observation:
     """Take the figures from the run of a scenario's closed loop.
 
     Parameters
@@ -50,16 +50,21 @@ def observe(analysis: Analysis, arc: HybridArc) -> Observation:
         The scenario; its cycle decides which part of the run counts as late.
     arc : HybridArc
         The run of ``closed_loop(scenario)``.
+    decay : float or None
+        beta [1/s] of the slowest part of the bound on the errors; None if there is no bound, and then no radius.
     """
     scenario = analysis.scenario
     gap = run_report(scenario, arc).min_gap
     times, free = undisturbed(analysis, float(arc.t[-1]))
+    shortest = None if gap is None else gap - 2 * TIME_TOLERANCE
+    if decay is None:
+        return Observation(min_gap=shortest, radius=None, initial_share=None)
     names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
     states = np.array([arc.at(name, times) for name in names])
-    growth = np.exp(scenario.trigger.decay * times)
+    growth = np.exp(decay * times)
     share = edge_norm(scenario, free) * growth
     return Observation(
-        min_gap=None if gap is None else gap - 2 * TIME_TOLERANCE,
+        min_gap=shortest,
         radius=max(0.0, float(np.max(edge_norm(scenario, states) * growth - share))),
         initial_share=float(np.max(share)),
     )

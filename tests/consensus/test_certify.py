@@ -403,3 +403,48 @@ class TestWeightsWithoutAPeriod:
         assert {"periodic weights", "exciting tree"} <= set(failed)
         assert found.value("radius", "observed") <= found.value("radius", "exact")
         assert found.value("min_gap", "improved") > 0
+
+
+def small(weights, trigger, initial, stop_time):
+    """A path of agents under a trigger, and what its run shows."""
+    scenario = read_scenario(
+        {
+            "name": "small",
+            "stop_time": stop_time,
+            "network": {
+                "agents": len(initial),
+                "edges": [[k, k + 1] for k in range(1, len(initial))],
+                "initial": initial,
+            },
+            "weights": weights,
+            "trigger": trigger,
+        }
+    )
+    return certify(scenario, hm.simulate(compiled(closed_loop(scenario)), stop_time))
+
+
+def test_weights_without_corners_hide_no_shorter_gap():
+    """Fast sine weights: the most that an edge carries in a gap lies between the starts of a coarse search."""
+    weights = {"kind": "sine", "mean": 0.05, "depth": 1.0, "rate": 50.0, "phase": 0.7853981633974483}
+    found = small(weights, {"kind": "static", "threshold": 0.0002}, [1.0, 0.0], 0.3)
+    assert found.value("min_gap", "valid") <= found.value("min_gap", "improved") <= found.value("min_gap", "observed")
+
+
+def test_sampled_checks_broadcast_from_the_threshold_on():
+    """Errors overshoot the threshold between checks, but a broadcast needs no more than the threshold."""
+    trigger = {"kind": "sampled", "threshold": 0.3, "period": 0.02}
+    found = small({"kind": "constant", "value": 1.0}, trigger, [100.0, 0.0], 2.0)
+    # The observed gap is reported less the tolerance of its two times.
+    assert found.value("min_gap", "improved") <= found.value("min_gap", "observed") + 2.1e-8
+
+
+def test_the_observed_radius_of_a_mixed_threshold_is_that_of_its_lasting_part():
+    trigger = {"kind": "mixed", "offset": 0.1, "threshold": 0.5, "decay": 0.3}
+    found = small({"kind": "constant", "value": 1.0}, trigger, [1.0, 0.0, 2.0], 40.0)
+    assert 0.0 < found.value("radius", "observed") <= found.value("radius", "exact")
+
+
+def test_a_mixed_threshold_that_decays_fast_is_promised_no_consensus():
+    trigger = {"kind": "mixed", "offset": 0.1, "threshold": 0.5, "decay": 3.0}
+    found = small({"kind": "constant", "value": 1.0}, trigger, [1.0, 0.0], 6.0)
+    assert not any("onsensus is still reached" in note or "still ||x_e(t)||" in note for note in found.notes)
