@@ -85,7 +85,7 @@ class Bounds:
             return None
         degrees = self.analysis.moved_degrees().tolist()
         omega = float(np.max(self.analysis.largest_weights))
-        c = sampled_threshold(scenario, min(worst.radius, energy), self._peaks(decay)[0], degrees, omega)
+        c = sampled_threshold(scenario, min(worst.radius * worst.cover, energy), self._peaks(decay)[0], degrees, omega)
         return None if c is None else ((c, decay),)
 
     def _worst(self, decay: float) -> WorstCase | None:
@@ -238,12 +238,13 @@ class Bounds:
         analysis, network = self.analysis, self.analysis.scenario.network
         norm, pairs = self._peaks(decay) if with_initial else (0.0, np.zeros(len(network.edges)))
         energy = energy_radius(analysis, decay)
-        radius = min(worst.radius, math.inf if energy is None else energy) * c + norm
+        radius = min(worst.radius * worst.cover, math.inf if energy is None else energy) * c + norm
         bound = self._part_bound(c, decay)
         if bound.kappa1 is not None and bound.kappa2 is not None and decay < bound.rate:
             start = max(bound.kappa1, 0.0) if with_initial else 0.0
             radius = min(radius, bound.edge_factor * (start + bound.kappa2))
-        widths = np.minimum(c * np.array([worst.pairs[edge] for edge in network.edges]) + pairs, radius)
+        reached = worst.cover * np.array([worst.pairs[edge] for edge in network.edges])
+        widths = np.minimum(c * reached + pairs, radius)
         by_degree = self._speeds_by_degree(radius, c)
         per_edge = network.gain * (widths + 2 * c)
         level = c if threshold is None else threshold

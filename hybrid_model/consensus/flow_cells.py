@@ -1,6 +1,8 @@
 """The undisturbed flow ``xi' = -k N(t) xi`` on a grid of short cells: what the exact worst case is summed over."""
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,9 @@ from hybrid_model.consensus.scenario_data import Scenario
 
 __all__ = ["FlowCells", "affordable_resolution", "flow_cells"]
 
-_MOST_PER_PIECE = 20_000
+_MOST_PER_PIECE = 100_000
+_MOST_BLOCKS = 256
+_TOGETHER = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +38,7 @@ class FlowCells:
     flows: NDArray[np.float64]
     doses: NDArray[np.float64]
 
-    @property
+    @cached_property
     def is_idle(self) -> NDArray[np.bool_]:
         """Mask, shape (cells,), of the cells in which no edge carries weight."""
         return np.asarray(~self.doses.any(axis=1))
@@ -46,8 +50,63 @@ class FlowCells:
             flow = cell @ flow
         return flow
 
+    def rate(self) -> float:
+        """``-ln(max |multiplier|)`` over the interval, per second: the Floquet rate if it is a period.
 
-def flow_cells(scenario: Scenario, t0: float, t1: float, resolution: float, longest: float = np.inf) -> FlowCells:
+        The product is scaled on the way, so that a multiplier far below the smallest float keeps its digits.
+        """
+        flow, logarithm = np.eye(self.flows.shape[1]), 0.0
+        for cell in self.flows:
+            flow = cell @ flow
+            size = float(np.max(np.abs(flow)))
+            if size < 1e-100:
+                flow, logarithm = flow / size, logarithm + np.log(size)
+        largest = float(np.max(np.abs(np.linalg.eigvals(flow))))
+        return -(float(np.log(largest)) + logarithm) / float(self.times[-1] - self.times[0])
+
+    def contraction(self) -> float:
+        """Largest ``||phi(t + P, t)||`` over the ends t of the cells of one period P."""
+        size, count = self.flows.shape[1], len(self.flows)
+        before, after = np.empty((count, size, size)), np.empty((count, size, size))
+        flow = np.eye(size)
+        for j in range(count):
+            before[j], flow = flow, self.flows[j] @ flow
+        flow = np.eye(size)
+        for j in range(count - 1, -1, -1):
+            flow = after[j] = flow @ self.flows[j]
+        return float(np.max(np.linalg.norm(before @ after, 2, axis=(1, 2))))
+
+    def overshoot(self, rate: float) -> float:
+        """``sup ||phi(t, s)|| exp(rate (t - s))`` over starts s in the period and two periods after each.
+
+        The supremum is over the ends of the cells. If there are many, they are joined to blocks, and what the
+        exponential grows by within the two blocks of s and t is added: norms never grow, so that is never too little.
+        """
+        count, size = len(self.flows), self.flows.shape[1]
+        step = -(-count // _MOST_BLOCKS)
+        cuts = np.append(np.arange(0, count, step), count)
+        lengths = np.diff(self.times[cuts])
+        blocks = np.empty((len(lengths), size, size))
+        for k, (first, last) in enumerate(pairwise(cuts.tolist())):
+            flow = np.eye(size)
+            for cell in self.flows[first:last]:
+                flow = cell @ flow
+            blocks[k] = flow
+        places = np.arange(len(blocks))
+        flows, ages, largest = np.broadcast_to(np.eye(size), blocks.shape), np.zeros(len(blocks)), 0.0
+        for j in range(2 * len(blocks)):
+            at = (places + j) % len(blocks)
+            flows, ages = blocks[at] @ flows, ages + lengths[at]
+            # Both factors can leave the range of floats; their product does not.
+            scale = np.log(np.maximum(np.linalg.norm(flows, 2, axis=(1, 2)), np.finfo(float).tiny))
+            largest = max(largest, float(np.max(scale + rate * ages)))
+        within = 2 * rate * float(np.max(lengths)) if step > 1 else 0.0
+        return float(np.exp(min(largest + within, 700.0)))
+
+
+def flow_cells(
+    scenario: Scenario, t0: float, t1: float, resolution: float, longest: float = np.inf, *, joined: bool = False
+) -> FlowCells:
     """Cut an interval so finely that the flow hardly changes over a cell.
 
     Parameters
@@ -60,6 +119,9 @@ def flow_cells(scenario: Scenario, t0: float, t1: float, resolution: float, long
         ``k ||int N||`` of a cell, on the average over each piece.
     longest : float
         Largest length [s] of a cell in which some edge carries weight.
+    joined : bool
+        Whether cells that are much shorter than `resolution` and `longest` ask for, because a weight oscillates, are
+        joined by fours once their flows are known.
 
     Notes
     -----
@@ -71,9 +133,14 @@ def flow_cells(scenario: Scenario, t0: float, t1: float, resolution: float, long
     gain = scenario.network.gain
     cuts, flows, doses = [np.array([t0])], [], []
     for piece in scenario.edge_weights.pieces(t0, t1):
-        times = np.linspace(piece.start, piece.end, _count(piece, gain, factor, resolution, longest) + 1)
+        count, each = _counts(piece, gain, factor, resolution, longest)
+        times = np.linspace(piece.start, piece.end, count * each + 1)
         dose = piece.amplitudes * np.stack([c.integral(times[:-1], times[1:]) for c in piece.carriers], axis=-1)
-        flows.append(_flows(piece, gain, factor, times, dose))
+        flow = _flows(piece, gain, factor, times, dose)
+        if joined and each >= _TOGETHER:
+            parts = dose.reshape(-1, _TOGETHER, dose.shape[1])
+            flow, dose, times = _joined(flow), parts.sum(axis=1), times[::_TOGETHER]
+        flows.append(flow)
         doses.append(dose)
         cuts.append(times[1:])
     return FlowCells(np.concatenate(cuts), np.concatenate(flows), np.concatenate(doses))
@@ -91,15 +158,30 @@ def _spent(piece: Piece, gain: float, factor: NDArray[np.float64]) -> float:
     return gain * float(np.linalg.eigvalsh((factor * dose) @ factor.T)[-1])
 
 
-def _count(piece: Piece, gain: float, factor: NDArray[np.float64], resolution: float, longest: float) -> int:
+def _counts(
+    piece: Piece, gain: float, factor: NDArray[np.float64], resolution: float, longest: float
+) -> tuple[int, int]:
+    """Number of cells, and into how many parts each is cut so that the carriers are smooth over a part."""
     if piece.is_idle:
-        return 1
+        return 1, 1
     length = piece.end - piece.start
     steps = max(_spent(piece, gain, factor) / resolution, length / longest)
+    count, each = int(np.clip(np.ceil(steps), 1, _MOST_PER_PIECE)), 1
     if piece.shared_carrier is None:
-        # The Magnus series needs carriers that are smooth over a cell: 64 cells a half wave make its error negligible.
-        steps = max(steps, 64 * length * max(_rate(carrier) for carrier in piece.carriers) / np.pi)
-    return int(np.clip(np.ceil(steps), 1, _MOST_PER_PIECE))
+        # The Magnus series needs carriers that are smooth over a part: 64 parts a half wave make its error negligible.
+        fine = 64 * length * max(_rate(carrier) for carrier in piece.carriers) / np.pi
+        each = int(np.clip(np.ceil(fine / count), 1, max(1, _MOST_PER_PIECE // count)))
+    # Parts that may be joined later come in full groups.
+    return count, each if each < _TOGETHER else -(-each // _TOGETHER) * _TOGETHER
+
+
+def _joined(flows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Products of consecutive flows."""
+    parts = flows.reshape(-1, _TOGETHER, *flows.shape[1:])
+    product = parts[:, 0]
+    for k in range(1, _TOGETHER):
+        product = parts[:, k] @ product
+    return product
 
 
 def _rate(carrier: Carrier) -> float:

@@ -11,6 +11,7 @@ Its largest value along b is therefore the total variation over s of the entries
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import cached_property
 from itertools import pairwise
 
@@ -30,9 +31,13 @@ _APART = 0.5
 _STALLED = 1e-10
 _TAIL = 1e-11
 _MOST_CYCLES = 20_000
-_MOST_CELLS = 6000
-_MOST_TIMES = 400
-_MOST_STARTS = 1500
+_MOST_CELLS = 20_000
+_MOST_WAVING = 5000
+_MOST_TIMES = 800
+_FORGOTTEN = 1e-13
+_BLOCK = 64
+"""Cells whose flows to a common end are kept."""
+
 _CHUNK = 4_000_000
 """Numbers in the largest temporary array."""
 
@@ -53,17 +58,35 @@ class ReachableSets:
         order: about a share of 1e-6 at 0.01.
     periodic : bool
         False if errors begin at t = 0 and `period` is the end of the run.
+    most : int
+        Number of cells beyond which the resolution is made coarser.
+
+    Attributes
+    ----------
+    resolution : float
+        The one in use.
     """
 
     def __init__(
-        self, scenario: Scenario, period: float, decay: float, resolution: float, *, periodic: bool = True
+        self,
+        scenario: Scenario,
+        period: float,
+        decay: float,
+        resolution: float,
+        *,
+        periodic: bool = True,
+        most: int = _MOST_CELLS,
     ) -> None:
         """Cut one period into cells."""
         self._periodic = periodic
-        resolution = affordable_resolution(scenario, 0.0, period, resolution, _MOST_CELLS)
-        longest = resolution / decay if decay > 0 else np.inf
-        self._cells: FlowCells = flow_cells(scenario, 0.0, period, resolution, longest)
-        self._period, self._decay, self._resolution = period, decay, resolution
+        self.resolution = affordable_resolution(scenario, 0.0, period, resolution, most)
+        longest = self.resolution / decay if decay > 0 else np.inf
+        # Cells that follow each wave serve accuracy: they are kept as long as there are not too many.
+        waving = 64 * period * max(carrier.rate for carrier in scenario.edge_weights.carriers) / np.pi
+        self._cells: FlowCells = flow_cells(
+            scenario, 0.0, period, self.resolution, longest, joined=waving > _MOST_WAVING
+        )
+        self._period, self._decay = period, decay
         network = scenario.network
         self._basis = disagreement_basis(network.agents)
         self._edge_form = self._basis.T @ incidence(network.agents, network.underlying_edges)
@@ -94,22 +117,60 @@ class ReachableSets:
         monodromy : ndarray, shape (p, p)
             ``phi(t, t - P) exp(beta P)``.
         """
-        size = self._basis.shape[1]
-        count = len(self._cells.flows) if self._periodic else index
-        flow, steps, ages = np.eye(size), [np.zeros((size, size))], [0.0]
-        age, lengths, idle = 0.0, np.diff(self._cells.times), self._cells.is_idle
-        for j in range(index - 1, index - 1 - count, -1):
-            # Indices below zero mean the period before, which looks the same.
-            earlier = flow @ self._cells.flows[j]
-            if not idle[j]:
-                steps.append(flow - earlier)
-                ages.append(age + lengths[j] / 2)
-            flow, age = earlier, age + lengths[j]
-        scale = np.exp(self._decay * np.array(ages))
-        moved = np.stack(steps) @ self._basis.T * scale[:, None, None]
+        cells, size = self._cells, self._basis.shape[1]
+        flow, age, steps, ages = np.eye(size), 0.0, [np.zeros((1, size, size))], [np.zeros(1)]
+        forgotten = False
+        idle = cells.is_idle
+        for first, last in self._backward(index):
+            forgotten = float(np.abs(flow).max()) * np.exp(self._decay * age) < _FORGOTTEN
+            if forgotten:
+                break
+            flows = flow @ self._to_the_end(first, last)
+            active = ~idle[first:last]
+            steps.append((np.concatenate((flows[1:], flow[None])) - flows)[active])
+            middles = (cells.times[first:last] + cells.times[first + 1 : last + 1]) / 2
+            ages.append((age + cells.times[last] - middles)[active])
+            flow, age = flows[0], age + float(cells.times[last] - cells.times[first])
+        scale = np.exp(self._decay * np.concatenate(ages))
+        moved = np.concatenate(steps) @ self._basis.T * scale[:, None, None]
         generators = np.swapaxes(moved, 1, 2).reshape(-1, size)
         # Without a period nothing happened before the start.
-        return generators, flow * (np.exp(self._decay * self._period) if self._periodic else 0.0)
+        lasting = self._periodic and not forgotten
+        return generators, flow * (np.exp(self._decay * self._period) if lasting else 0.0)
+
+    def _backward(self, index: int) -> Iterator[tuple[int, int]]:
+        """Ranges of cells, each within a block, from ``times[index]`` backward: one period, or to the start."""
+        ranges = [(0, index)]
+        if self._periodic:
+            # The period before looks the same.
+            ranges.append((index, len(self._cells.flows)))
+        for first, last in ranges:
+            while last > first:
+                begin = max((last - 1) // _BLOCK * _BLOCK, first)
+                yield begin, last
+                last = begin
+
+    def _to_the_end(self, first: int, last: int) -> NDArray[np.float64]:
+        """``phi(times[last], times[j])`` for the cells j from `first` to `last`, all in one block."""
+        block, count = first // _BLOCK, len(self._cells.flows)
+        if last == min((block + 1) * _BLOCK, count):
+            return self._block_flows[block, first % _BLOCK : (last - 1) % _BLOCK + 1]
+        flows = np.empty((last - first, *self._cells.flows.shape[1:]))
+        flow = np.eye(flows.shape[1])
+        for j in range(last - 1, first - 1, -1):
+            flow = flows[j - first] = flow @ self._cells.flows[j]
+        return flows
+
+    @cached_property
+    def _block_flows(self) -> NDArray[np.float64]:
+        """Flows from each cell's beginning to the end of its block, shape (blocks, cells of a block, p, p)."""
+        flows = self._cells.flows
+        size, blocks = flows.shape[1], -(-len(flows) // _BLOCK)
+        padded = np.concatenate((flows, np.broadcast_to(np.eye(size), (blocks * _BLOCK - len(flows), size, size))))
+        ends = padded.reshape(blocks, _BLOCK, size, size).copy()
+        for j in range(_BLOCK - 2, -1, -1):
+            ends[:, j] = ends[:, j + 1] @ ends[:, j]
+        return ends
 
     def support(
         self, index: int, directions: NDArray[np.float64], tail: float = _TAIL
@@ -157,32 +218,22 @@ class ReachableSets:
             return np.zeros(1, dtype=np.intp)
         cuts = np.append(scenario.edge_weights.breakpoints(0.0, self._period), self._period)
         ends = np.concatenate(([0], np.searchsorted(self._cells.times, cuts * (1 - 1e-12))))
-        step = max(1, round(_APART / self._resolution), len(self.times) // _MOST_TIMES)
-        return np.unique(np.concatenate([np.arange(a, b, step) for a, b in pairwise(ends)])).astype(np.intp)
+        step, least = max(1, round(_APART / self.resolution)), len(self.times) // _MOST_TIMES
+        fastest = max(carrier.rate for carrier in scenario.edge_weights.carriers)
+        found = []
+        for (a, b), length in zip(pairwise(ends.tolist()), np.diff(cuts, prepend=0.0).tolist(), strict=True):
+            # Eight a wave where weights oscillate without a break.
+            points = max(1, int(4 * fastest * length / np.pi) - 3)
+            found.append(np.arange(a, b, max(1, least, min(step, (b - a) // points))))
+        return np.unique(np.concatenate(found)).astype(np.intp)
 
     def contraction(self) -> float:
         """Largest ``||phi(t + P, t)||`` over the grid of times."""
-        count, size = len(self._cells.flows), self._basis.shape[1]
-        places = np.arange(0, count, max(1, count // _MOST_STARTS))
-        flow = np.broadcast_to(np.eye(size), (len(places), size, size))
-        for j in range(count):
-            flow = self._cells.flows[(places + j) % count] @ flow
-        return float(np.max(np.linalg.norm(flow, 2, axis=(1, 2))))
+        return self._cells.contraction()
 
     def overshoot(self, rate: float) -> float:
-        """Largest ``||phi(t, s)|| exp(rate (t - s))`` over starts s in the period and two periods after each."""
-        cells = self._cells
-        count, size = len(cells.flows), self._basis.shape[1]
-        lengths = np.diff(cells.times)
-        places = np.arange(0, count, max(1, count // _MOST_STARTS))
-        flow, ages = np.broadcast_to(np.eye(size), (len(places), size, size)), np.zeros(len(places))
-        largest = 1.0
-        for j in range(2 * count):
-            flow, ages = cells.flows[(places + j) % count] @ flow, ages + lengths[(places + j) % count]
-            largest = max(
-                largest, float(np.max(np.linalg.norm(flow, 2, axis=(1, 2)) * np.exp(np.minimum(rate * ages, 700.0))))
-            )
-        return largest
+        """Largest ``||phi(t, s)|| exp(rate (t - s))``, see `FlowCells.overshoot`."""
+        return self._cells.overshoot(rate)
 
 
 def _support(
