@@ -1,0 +1,295 @@
+"""Units in FMI notation, such as ``m/s2``, ``N.m`` or ``1/(m.s)``, as products of the SI base units.
+
+The notation is that of Modelica (language specification 3.6, section 19.1): factors joined by a dot, one slash at most,
+parentheses around several factors, whole exponents after the symbol, and ``1`` for the empty product.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+"""Attributes of the element BaseUnit, in the order of the schemas."""
+
+Exponents = tuple[int, ...]
+Factor = tuple[str, int]
+
+
+@dataclass(frozen=True)
+class BaseUnit:
+    """A unit in terms of base units: value in base units = factor * value + offset.
+
+    Attributes
+    ----------
+    exponents : tuple of int, shape (8,)
+        Of kg, m, s, A, K, mol, cd, rad.
+    factor, offset : float
+        As in the FMI standard 3.0, section 2.4.3.
+    """
+
+    exponents: Exponents = (0,) * len(BASE_UNITS)
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def attributes(self) -> dict[str, str]:
+        """Return the attributes of the element BaseUnit that differ from their defaults."""
+        found = {name: str(n) for name, n in zip(BASE_UNITS, self.exponents, strict=True) if n}
+        if self.factor != 1.0:
+            found["factor"] = repr(self.factor)
+        if self.offset != 0.0:
+            found["offset"] = repr(self.offset)
+        return found
+
+
+def _base(factor: float = 1.0, offset: float = 0.0, **exponents: int) -> BaseUnit:
+    return BaseUnit(tuple(exponents.get(name, 0) for name in BASE_UNITS), factor, offset)
+
+
+# The prefixed units kg and (from them) everything mechanical are coherent; g is what prefixes are set before.
+_PREFIXABLE = {
+    "m": _base(m=1),
+    "g": _base(1e-3, kg=1),
+    "s": _base(s=1),
+    "A": _base(A=1),
+    "K": _base(K=1),
+    "mol": _base(mol=1),
+    "cd": _base(cd=1),
+    "rad": _base(rad=1),
+    "sr": _base(rad=2),
+    "Hz": _base(s=-1),
+    "N": _base(kg=1, m=1, s=-2),
+    "Pa": _base(kg=1, m=-1, s=-2),
+    "J": _base(kg=1, m=2, s=-2),
+    "W": _base(kg=1, m=2, s=-3),
+    "C": _base(s=1, A=1),
+    "V": _base(kg=1, m=2, s=-3, A=-1),
+    "F": _base(kg=-1, m=-2, s=4, A=2),
+    "Ohm": _base(kg=1, m=2, s=-3, A=-2),
+    "S": _base(kg=-1, m=-2, s=3, A=2),
+    "Wb": _base(kg=1, m=2, s=-2, A=-1),
+    "T": _base(kg=1, s=-2, A=-1),
+    "H": _base(kg=1, m=2, s=-2, A=-2),
+    "lm": _base(cd=1, rad=2),
+    "lx": _base(m=-2, cd=1, rad=2),
+    "Bq": _base(s=-1),
+    "Gy": _base(m=2, s=-2),
+    "Sv": _base(m=2, s=-2),
+    "kat": _base(s=-1, mol=1),
+    "l": _base(1e-3, m=3),
+    "bar": _base(1e5, kg=1, m=-1, s=-2),
+    "eV": _base(1.602176634e-19, kg=1, m=2, s=-2),
+}
+_PLAIN = {
+    "min": _base(60.0, s=1),
+    "h": _base(3600.0, s=1),
+    "d": _base(86400.0, s=1),
+    "deg": _base(math.pi / 180.0, rad=1),
+    "rev": _base(2.0 * math.pi, rad=1),
+    "rpm": _base(math.pi / 30.0, s=-1, rad=1),
+    "t": _base(1e3, kg=1),
+    "ha": _base(1e4, m=2),
+    "degC": _base(1.0, 273.15, K=1),
+    "degF": _base(5.0 / 9.0, 459.67 * 5.0 / 9.0, K=1),
+    "%": _base(1e-2),
+}
+_PREFIXES = {
+    **{"Q": 30, "R": 27, "Y": 24, "Z": 21, "E": 18, "P": 15, "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "da": 1},
+    **{"d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12, "f": -15, "a": -18, "z": -21, "y": -24},
+}
+_FACTOR = re.compile(r"(?P<symbol>[A-Za-z%]+)(?P<exponent>[+-]?\d{1,3})?")
+
+
+@dataclass(frozen=True)
+class _Expression:
+    """A unit as it is written: factors above and below the slash."""
+
+    above: Sequence[Factor] = ()
+    below: Sequence[Factor] = ()
+
+    @property
+    def factors(self) -> list[Factor]:
+        return [*self.above, *((symbol, -exponent) for symbol, exponent in self.below)]
+
+
+def base_unit(text: str) -> BaseUnit | None:
+    """Return a unit in terms of base units.
+
+    Parameters
+    ----------
+    text : str
+        Unit in FMI notation.
+
+    Returns
+    -------
+    BaseUnit or None
+        None for a unit that is not known or not written in this notation.
+    """
+    expression = _parse(text)
+    if expression is None:
+        return None
+    factors = expression.factors
+    if len(factors) == 1 and factors[0][1] == 1:
+        return _symbol(factors[0][0])
+    exponents, factor = [0] * len(BASE_UNITS), 1.0
+    for symbol, power in factors:
+        known = _symbol(symbol)
+        # A scale with an offset has no products: 1/degC is a difference's, m.degC is nothing.
+        if known is None or known.offset:
+            return None
+        exponents = [total + power * n for total, n in zip(exponents, known.exponents, strict=True)]
+        factor *= known.factor**power
+    return BaseUnit(tuple(exponents), factor)
+
+
+def unit_per_second(text: str) -> str:
+    """Return the unit of a quantity's time derivative: ``m/s2`` for ``m/s``, ``1/s`` for ``1``.
+
+    Parameters
+    ----------
+    text : str
+        Unit in FMI notation.
+
+    Returns
+    -------
+    str
+        Empty if the unit is empty, or not written in this notation; ``K/s`` for temperatures in degC.
+    """
+    expression = _parse(text)
+    if expression is None or "degF" in text:
+        return ""
+    above = [("K" if symbol == "degC" else symbol, power) for symbol, power in expression.above]
+    below = list(expression.below)
+    for side, change in ((below, 1), (above, -1)):
+        at = next((k for k, (symbol, _) in enumerate(side) if symbol == "s"), None)
+        if at is not None:
+            power = side[at][1] + change
+            side[at : at + 1] = [("s", power)] if power else []
+            return _written(above, below)
+    return _written(above, [*below, ("s", 1)])
+
+
+def _parse(text: str) -> _Expression | None:
+    above, slash, below = text.partition("/")
+    if not slash and text == "1":
+        return _Expression()
+    numerator = [] if above == "1" else _factors(above)
+    denominator = _factors(below) if slash else []
+    if numerator is None or denominator is None:
+        return None
+    if len(denominator) > 1 and not below.startswith("("):
+        return None  # J/kg.K means J/(kg.K) to some and J.K/kg to others
+    return _Expression(tuple(numerator), tuple(denominator))
+
+
+def _factors(text: str) -> list[Factor] | None:
+    inner = text[1:-1] if text.startswith("(") and text.endswith(")") else text
+    found = [_FACTOR.fullmatch(part) for part in inner.split(".")]
+    if not all(found):
+        return None
+    return [(match["symbol"], int(match["exponent"] or 1)) for match in found if match]
+
+
+def _symbol(symbol: str) -> BaseUnit | None:
+    known = _PLAIN.get(symbol) or _PREFIXABLE.get(symbol)
+    if known is not None:
+        return known if symbol != "g" else _PREFIXABLE["g"]
+    for length in (1, 2):
+        prefix, unit = symbol[:length], _PREFIXABLE.get(symbol[length:])
+        if prefix in _PREFIXES and unit is not None:
+            # One rounding: kg has the factor 1 and not 1e-3 * 1e3.
+            power = _PREFIXES[prefix] + round(math.log10(unit.factor)) if unit.factor in (1.0, 1e-3, 1e5) else None
+            factor = float(f"1e{power}") if power is not None else unit.factor * 10.0 ** _PREFIXES[prefix]
+            return BaseUnit(unit.exponents, factor)
+    return None
+
+
+def _written(above: Sequence[Factor], below: Sequence[Factor]) -> str:
+    def product(factors: Sequence[Factor]) -> str:
+        return ".".join(symbol if power == 1 else f"{symbol}{power}" for symbol, power in factors)
+
+    if not below:
+        return product(above) or "1"
+    bottom = product(below)
+    return f"{product(above) or '1'}/{bottom if len(below) == 1 else f'({bottom})'}"
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a unit measures, for type definitions: a name, and the units that people read it in.
+
+    Attributes
+    ----------
+    name : str
+        Quantity in the sense of ISO 80000, one word.
+    displays : tuple of str
+        Other units for the same quantity.
+    """
+
+    name: str
+    displays: tuple[str, ...] = field(default=())
+
+
+_QUANTITIES = {
+    "m": Quantity("Length"),
+    "m2": Quantity("Area"),
+    "m3": Quantity("Volume"),
+    "s": Quantity("Time"),
+    "m/s": Quantity("Velocity", ("km/h",)),
+    "m/s2": Quantity("Acceleration"),
+    "m3/s": Quantity("VolumeFlowRate"),
+    "rad": Quantity("Angle", ("deg",)),
+    "rad/s": Quantity("AngularVelocity", ("deg/s", "rpm")),
+    "rad/s2": Quantity("AngularAcceleration"),
+    "Hz": Quantity("Frequency"),
+    "kg": Quantity("Mass"),
+    "N": Quantity("Force"),
+    "N.m": Quantity("Torque"),
+    "Pa": Quantity("Pressure", ("bar",)),
+    "J": Quantity("Energy"),
+    "W": Quantity("Power"),
+    "A": Quantity("ElectricCurrent"),
+    "V": Quantity("ElectricPotential"),
+    "C": Quantity("ElectricCharge"),
+    "F": Quantity("Capacitance"),
+    "H": Quantity("Inductance"),
+    "Ohm": Quantity("Resistance"),
+    "K": Quantity("ThermodynamicTemperature", ("degC",)),
+    "degC": Quantity("CelsiusTemperature"),
+    "mol": Quantity("AmountOfSubstance"),
+    "cd": Quantity("LuminousIntensity"),
+}
+
+
+def quantity(text: str) -> Quantity | None:
+    """Return what a unit measures, or None where the unit does not say: ``1/s`` is a rate or a frequency.
+
+    Parameters
+    ----------
+    text : str
+        Unit in FMI notation.
+    """
+    return _QUANTITIES.get(text)
+
+
+def display_attributes(unit: str, display: str) -> dict[str, str]:
+    """Return the attributes of a DisplayUnit: value in `display` = factor * value in `unit` + offset.
+
+    Parameters
+    ----------
+    unit, display : str
+        Two units of one quantity.
+
+    Raises
+    ------
+    ValueError
+        If they do not measure the same.
+    """
+    known, shown = base_unit(unit), base_unit(display)
+    if known is None or shown is None or known.exponents != shown.exponents:
+        raise ValueError(f"{display!r} does not measure what {unit!r} does: choose two units of one quantity.")
+    attributes = {"name": display, "factor": repr(known.factor / shown.factor)}
+    offset = (known.offset - shown.offset) / shown.factor
+    return attributes | ({"offset": repr(offset)} if offset else {})
