@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from hybrid_model.consensus.shown import shown
 from hybrid_model.consensus.tables import ScenarioError
 
 __all__ = ["IDEAL", "Channel"]
 
 SEED_LIMIT = 2**31 - 1
+MOST_SLOTS = 1000
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Channel:
         Fixes which broadcasts are lost; the same in every execution.
     slots : int
         Broadcasts that may be under way on a link at once; a delay below the shortest time between two broadcasts of
-        an agent needs one.
+        an agent needs one; at most 1000.
 
     Raises
     ------
@@ -46,9 +48,13 @@ class Channel:
         if not 0 <= self.loss < 1:
             raise ScenarioError(f"[channel] loss is {self.loss}; it must be a probability from 0 to below 1.")
         if not 0 <= self.seed < SEED_LIMIT:
-            raise ScenarioError(f"[channel] seed is {self.seed}; it must be a whole number from 0 to {SEED_LIMIT - 1}.")
-        if self.slots < 1:
-            raise ScenarioError(f"[channel] slots is {self.slots}; it must be at least 1.")
+            raise ScenarioError(
+                f"[channel] seed is {shown(self.seed)}; it must be a whole number from 0 to {SEED_LIMIT - 1}."
+            )
+        if not 1 <= self.slots <= MOST_SLOTS:
+            raise ScenarioError(
+                f"[channel] slots is {shown(self.slots)}; it must be at least 1 and at most {MOST_SLOTS}."
+            )
 
     @property
     def ideal(self) -> bool:

@@ -12,6 +12,7 @@ import networkx as nx
 import numpy as np
 
 from hybrid_model.consensus.graphs import Edge
+from hybrid_model.consensus.shown import shown
 from hybrid_model.consensus.spanning_trees import is_connected
 from hybrid_model.consensus.switching_sequence import SwitchingSequence, validate_active
 from hybrid_model.consensus.waveform import require
@@ -105,12 +106,18 @@ def markov_sequence(
         If a number is out of range or the matrix is not one of chances.
     """
     graphs = _checked(active, edge_count)
+    if len(transition) != len(graphs):
+        raise ValueError(f"transition lists {len(transition)} rows for {len(graphs)} graphs in active; give one each.")
+    for number, chances in enumerate(transition, start=1):
+        if len(chances) != len(graphs):
+            raise ValueError(
+                f"transition[{number}] lists {len(chances)} numbers for {len(graphs)} graphs in active; give a chance "
+                "for each."
+            )
     matrix = np.array(transition, dtype=float)
-    if matrix.shape != (len(graphs), len(graphs)):
-        raise ValueError(f"transition has the shape {matrix.shape}; it must be square, a row for each of the graphs.")
     for number, row in enumerate(matrix, start=1):
         if not (np.all(row >= 0) and abs(row.sum() - 1) < 1e-9):
-            raise ValueError(f"transition[{number}] is {row.tolist()}; it must hold chances that add up to 1.")
+            raise ValueError(f"transition[{number}] is {shown(row.tolist())}; it must hold chances that add up to 1.")
     if not 1 <= first <= len(graphs):
         raise ValueError(f"first is {first}; graphs are numbered from 1 to {len(graphs)}.")
     draw = _uniform(seed)
@@ -171,15 +178,20 @@ def jointly_connected_sequence(
     if not is_connected(agents, edges):
         raise ValueError("the network's graph is not connected, so no union of its subgraphs is; add edges.")
     require("window", window, window > 0, "must be positive")
-    require("graphs", graphs, graphs >= 1, "must be at least 1")
+    if not 1 <= graphs <= _MOST_INTERVALS:
+        raise ValueError(f"graphs is {shown(graphs)}; it must be at least 1 and at most {_MOST_INTERVALS}.")
     require("spare", spare, 0 <= spare <= 1, "must lie between 0 and 1")
     require("duration", duration, duration > 0, "must be positive")
-    count = math.ceil(duration / window - 1e-9)
-    if count * graphs > _MOST_INTERVALS:
-        raise ValueError(f"duration holds {count} windows of {graphs} graphs; choose at most {_MOST_INTERVALS} graphs.")
+    if duration * graphs > _MOST_INTERVALS * window:
+        raise ValueError(
+            f"window is {window} s for a duration of {duration} s and graphs is {graphs}, which makes more than "
+            f"{_MOST_INTERVALS} graphs; choose a longer window, fewer graphs or a shorter duration."
+        )
+    count = max(1, math.ceil(duration / window - 1e-9))
     draw = _uniform(seed)
     dwells: list[float] = []
     active: list[tuple[int, ...]] = []
+    begin = 0.0
     for number in range(1, count + 1):
         tree = _random_tree(edges, draw)
         place = {edge: int(draw() * graphs) for edge in tree}
@@ -190,9 +202,10 @@ def jointly_connected_sequence(
             active.append(tuple(chosen))
         shares = np.array([draw() for _ in range(graphs)])
         lengths = window / graphs * (0.5 + 0.5 * graphs * (shares + 1e-9) / (shares + 1e-9).sum())
-        dwells += lengths[:-1].tolist()
         # The last one ends with the window, to the last digit.
-        dwells.append(number * window - sum(dwells))
+        begin = sum(lengths[:-1].tolist(), begin)
+        dwells += [*lengths[:-1].tolist(), number * window - begin]
+        begin += dwells[-1]
     sequence = SwitchingSequence(tuple(dwells), tuple(active), len(edges), repeat)
     _check_unions(sequence, agents, edges, graphs)
     return sequence
@@ -236,7 +249,8 @@ def _draw(
         graph = following(graph)
         if len(dwells) > _MOST_INTERVALS:
             raise ValueError(
-                f"more than {_MOST_INTERVALS} intervals are drawn up to {total:.6g} s; choose longer ones."
+                f"duration is {duration:.6g} s, for which more than {_MOST_INTERVALS} intervals are drawn; choose it "
+                "shorter, or longer intervals (shortest, longest)."
             )
     return SwitchingSequence(tuple(dwells), tuple(active), edge_count, repeat)
 
@@ -249,7 +263,7 @@ def _dwell(shortest: float, longest: float, draw: Callable[[], float]) -> Callab
 
 def _uniform(seed: int) -> Callable[[], float]:
     if seed < 0:
-        raise ValueError(f"seed is {seed}; it must not be negative.")
+        raise ValueError(f"seed is {shown(seed)}; it must not be negative.")
     generator = np.random.Generator(np.random.PCG64(seed))
     return lambda: float(generator.random())
 

@@ -11,6 +11,7 @@ from hybrid_model.consensus.random_switching import (
 )
 from hybrid_model.consensus.scenario_data import Network
 from hybrid_model.consensus.switching import PeriodicSwitching, Switching, SwitchingSequence
+from hybrid_model.consensus.switching_sequence import validate_active
 from hybrid_model.consensus.tables import ScenarioError, Table
 
 __all__ = ["SWITCHING_KEYS", "SwitchingKind", "read_switching"]
@@ -67,23 +68,22 @@ def read_switching(make_table: Callable[[tuple[str, ...]], Table], network: Netw
 
 
 def _periodic(table: Table, network: Network, stop_time: float) -> Switching:
-    dwell, active = table.number("dwell"), table.whole_number_lists("active")
-    return PeriodicSwitching(dwell, active, len(network.edges))
+    return PeriodicSwitching(table.number("dwell"), _active(table, network), len(network.edges))
 
 
 def _sequence(table: Table, network: Network, stop_time: float) -> Switching:
-    active = table.whole_number_lists("active")
-    dwells = table.per_item("dwell", len(active), "graph")
+    active = _active(table, network)
+    dwells = table.per_item("dwell", len(active), "graphs in active")
     return SwitchingSequence(dwells, active, len(network.edges), table.flag("repeat", default=False))
 
 
 def _random_dwell(table: Table, network: Network, stop_time: float) -> Switching:
     return random_dwell_sequence(
-        table.whole_number_lists("active"),
+        _active(table, network),
         len(network.edges),
         shortest=table.number("shortest"),
         longest=table.number("longest"),
-        duration=table.number("duration", default=stop_time),
+        duration=_duration(table, stop_time),
         seed=table.whole_number("seed"),
         order=table.choice("order", Order, default=Order.CYCLIC),
         repeat=table.flag("repeat", default=False),
@@ -91,15 +91,15 @@ def _random_dwell(table: Table, network: Network, stop_time: float) -> Switching
 
 
 def _markov(table: Table, network: Network, stop_time: float) -> Switching:
-    active = table.whole_number_lists("active")
+    active = _active(table, network)
     shortest = table.number("shortest")
     return markov_sequence(
         active,
         len(network.edges),
-        transition=table.rows("transition", len(active), of_what="graphs", shared=False),
+        transition=table.rows("transition", len(active), of_what="graphs in active", shared=False),
         shortest=shortest,
         longest=table.number("longest", default=shortest),
-        duration=table.number("duration", default=stop_time),
+        duration=_duration(table, stop_time),
         seed=table.whole_number("seed"),
         first=table.whole_number("first") if "first" in table else 1,
         repeat=table.flag("repeat", default=False),
@@ -113,10 +113,28 @@ def _jointly_connected(table: Table, network: Network, stop_time: float) -> Swit
         window=table.number("window"),
         graphs=table.whole_number("graphs"),
         spare=table.number("spare", default=0.0),
-        duration=table.number("duration", default=stop_time),
+        duration=_duration(table, stop_time),
         seed=table.whole_number("seed"),
         repeat=table.flag("repeat", default=False),
     )
+
+
+def _active(table: Table, network: Network) -> tuple[tuple[int, ...], ...]:
+    """The graphs, checked before the lists that must be as long."""
+    active = table.whole_number_lists("active")
+    validate_active(active, len(network.edges))
+    return active
+
+
+def _duration(table: Table, stop_time: float) -> float:
+    duration = table.number("duration", default=stop_time)
+    if duration < stop_time and not table.flag("repeat", default=False):
+        raise table.error(
+            "duration",
+            duration,
+            f"must be at least stop_time, {stop_time:.6g} s, unless the sequence has repeat = true",
+        )
+    return duration
 
 
 _READERS: dict[SwitchingKind, Callable[[Table, Network, float], Switching]] = {

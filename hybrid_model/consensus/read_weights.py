@@ -6,6 +6,7 @@ from typing import Any
 
 from hybrid_model.consensus.samples_file import read_samples
 from hybrid_model.consensus.scenario_data import WeightKind, Weights
+from hybrid_model.consensus.shown import shown
 from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
 from hybrid_model.consensus.tables import ScenarioError, Table
 from hybrid_model.consensus.wave_weights import SineWeight, SquareWeight
@@ -50,7 +51,11 @@ def read_weights(make_table: Callable[[tuple[str, ...]], Table], edge_count: int
 
 
 def _constant(table: Table, edges: int, folder: Path) -> Weights:
-    return _each_edge(ConstantWeight, zip(table.per_edge("value", edges), strict=True))
+    values = table.per_edge("value", edges)
+    for number, value in enumerate(values, start=1):
+        if value < 0:
+            raise table.error(f"value[{number}]" if table.lists("value") else "value", value, "must not be negative")
+    return _each_edge(ConstantWeight, zip(values, strict=True))
 
 
 def _gated_sine(table: Table, edges: int, folder: Path) -> Weights:
@@ -83,9 +88,12 @@ def _sampled(table: Table, edges: int, folder: Path) -> Weights:
         for key in ("times", "values"):
             if key in table:
                 raise table.error(key, "given beside file", "must be left out if the samples come from a file")
-        times, columns = read_samples(folder / table.text("file"), edges)
-    else:
-        times, columns = table.numbers("times"), table.rows("values", edges)
+        name = table.text("file")
+        times, columns = read_samples(folder / name, edges)
+        return _each_edge(
+            SampledWeight, ((times, values, repeat) for values in columns), f"file {shown(name)}, samples"
+        )
+    times, columns = table.numbers("times"), table.rows("values", edges)
     return _each_edge(SampledWeight, ((times, values, repeat) for values in columns))
 
 
@@ -106,11 +114,12 @@ _READERS: dict[WeightKind, Callable[[Table, int, Path], Weights]] = {
 }
 
 
-def _each_edge(waveform: Callable[..., Waveform], rows: Iterable[Any]) -> Weights:
+def _each_edge(waveform: Callable[..., Waveform], rows: Iterable[Any], source: str = "") -> Weights:
     waveforms = []
     for number, row in enumerate(rows, start=1):
         try:
             waveforms.append(waveform(*row))
         except ValueError as error:
-            raise ScenarioError(f"[weights] of edge {number}: {error}") from error
+            where = f"{source} of edge {number}" if source else f"of edge {number}"
+            raise ScenarioError(f"[weights] {where}: {error}") from error
     return Weights(tuple(waveforms))

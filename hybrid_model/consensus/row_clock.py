@@ -61,7 +61,9 @@ def check_rows(starts: tuple[float, ...], period: float | None, names: tuple[str
         require(f"{names[0]}[{number}]", start, start > before, f"must be later than the one before, {before}")
     if period is not None:
         span = starts[-1] - starts[0]
-        require(names[1], period, period > span, f"must be longer than {span}, from the first start to the last")
+        require(
+            names[1], period, period > span, f"must be longer than {span}, from the first of {names[0]} to the last"
+        )
 
 
 @dataclass(frozen=True)

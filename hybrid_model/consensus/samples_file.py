@@ -2,11 +2,15 @@
 
 import csv
 import zipfile
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid_model.consensus.shown import shown
 from hybrid_model.consensus.tables import ScenarioError
 
 __all__ = ["read_samples"]
@@ -33,10 +37,16 @@ def read_samples(path: Path, edge_count: int) -> Samples:
         the row.
     """
     readers = {".csv": _read_csv, ".npz": _read_npz}
+    if "\0" in str(path):
+        raise ScenarioError(f"the file of samples {shown(str(path))} cannot be read: its name holds a null character.")
     if path.suffix not in readers:
         raise ScenarioError(f"the file of samples {path} ends in '{path.suffix}'; it must be a .csv or .npz file.")
     try:
         times, weights = readers[path.suffix](path)
+    except UnicodeDecodeError as error:
+        raise ScenarioError(
+            f"the file of samples {path} is not a text in UTF-8: byte {error.start} cannot be decoded."
+        ) from error
     except OSError as error:
         raise ScenarioError(f"the file of samples {path} cannot be read: {error.strerror or error}.") from error
     if weights.shape[1] not in (1, edge_count):
@@ -51,7 +61,7 @@ def read_samples(path: Path, edge_count: int) -> Samples:
 def _read_csv(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     rows: list[list[float]] = []
     with path.open(newline="", encoding="utf-8") as file:
-        for number, cells in enumerate(csv.reader(file), start=1):
+        for number, cells in enumerate(_csv_rows(file, path), start=1):
             if not cells:
                 continue
             try:
@@ -59,7 +69,9 @@ def _read_csv(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
             except ValueError:
                 if number == 1:
                     continue
-                raise ScenarioError(f"the file of samples {path} has no numbers in row {number}: {cells}.") from None
+                raise ScenarioError(
+                    f"the file of samples {path} has no numbers in row {number}: {shown(cells)}."
+                ) from None
             if len(rows[-1]) != len(rows[0]) or len(cells) < 2:
                 raise ScenarioError(
                     f"the file of samples {path} has {len(cells)} cells in row {number}; each row must hold the time "
@@ -71,19 +83,32 @@ def _read_csv(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return table[:, 0], table[:, 1:]
 
 
+def _csv_rows(file: TextIO, path: Path) -> Iterator[list[str]]:
+    try:
+        yield from csv.reader(file)
+    except csv.Error as error:
+        raise ScenarioError(f"the file of samples {path} is not a table of comma-separated values: {error}.") from error
+
+
 def _read_npz(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            missing = [name for name in ("t", "w") if name not in arrays]
-            if missing:
-                raise ScenarioError(
-                    f"the file of samples {path} has no array '{missing[0]}'; it must hold 't' and 'w'."
-                )
-            times, weights = np.asarray(arrays["t"], dtype=float), np.asarray(arrays["w"], dtype=float)
-    except (zipfile.BadZipFile, ValueError) as error:
-        if isinstance(error, ScenarioError):
-            raise
+        arrays = np.load(path, allow_pickle=False)
+        if not isinstance(arrays, np.lib.npyio.NpzFile):
+            raise ValueError("it holds a single array")
+        with arrays:
+            found = {name: arrays[name] for name in ("t", "w") if name in arrays}
+    except (zipfile.BadZipFile, zlib.error, EOFError, ValueError, NotImplementedError) as error:
         raise ScenarioError(f"the file of samples {path} is not an npz file of numbers: {error}.") from error
+    for name in ("t", "w"):
+        if name not in found:
+            raise ScenarioError(f"the file of samples {path} has no array '{name}'; it must hold 't' and 'w'.")
+        if found[name].dtype.kind not in "fiu":
+            raise ScenarioError(
+                f"the file of samples {path}: '{name}' holds {found[name].dtype}; it must hold real numbers."
+            )
+    times, weights = found["t"].astype(float), found["w"].astype(float)
+    if weights.ndim > 0 and len(weights) == 0:
+        raise ScenarioError(f"the file of samples {path} has no samples; it must hold at least 2.")
     columns = weights.reshape(len(weights), -1) if weights.ndim in (1, 2) else weights
     if times.ndim != 1 or columns.ndim != 2 or len(times) != len(columns):
         raise ScenarioError(

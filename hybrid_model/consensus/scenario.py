@@ -126,8 +126,11 @@ def _parse(source: str, content: bytes, folder: Path = Path()) -> Scenario:
         entries = tomllib.loads(content.decode("utf-8"))
     except UnicodeDecodeError as error:
         raise ScenarioError(f"{source} is not a text in UTF-8: byte {error.start} cannot be decoded.") from error
-    except tomllib.TOMLDecodeError as error:
-        raise ScenarioError(f"{source} is not valid TOML: {error}.") from error
+    except ValueError as error:
+        # Of the parser, or of Python for an integer with thousands of digits.
+        raise ScenarioError(f"{source} is not valid TOML: {str(error).partition(';')[0]}.") from error
+    except RecursionError as error:
+        raise ScenarioError(f"{source} is not valid TOML: its tables or lists are nested too deeply.") from error
     try:
         return read_scenario(entries, folder)
     except ScenarioError as error:

@@ -8,6 +8,7 @@ from functools import cached_property
 from hybrid_model.consensus.channel_data import IDEAL, Channel
 from hybrid_model.consensus.edge_weights import EdgeWeights
 from hybrid_model.consensus.graphs import Edge, complete_edges, validate_edges
+from hybrid_model.consensus.shown import shown
 from hybrid_model.consensus.switching import Switching
 from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
 from hybrid_model.consensus.tables import ScenarioError
@@ -90,14 +91,14 @@ class Network:
     def __post_init__(self) -> None:
         """Check the values."""
         if self.agents < 2:
-            raise ScenarioError(f"[network] agents is {self.agents}; consensus needs at least 2 agents.")
+            raise ScenarioError(f"[network] agents is {shown(self.agents)}; consensus needs at least 2 agents.")
         try:
             validate_edges(self.agents, self.edges)
         except ValueError as error:
-            raise ScenarioError(f"[network] {error}") from None
+            raise ScenarioError(f"[network] {error}" if not self.edges else f"[network] edges: {error}") from None
         if len(self.initial) != self.agents:
             raise ScenarioError(
-                f"[network] initial lists {len(self.initial)} numbers for {self.agents} agents; give one each."
+                f"[network] initial lists {len(self.initial)} numbers for {shown(self.agents)} agents; give one each."
             )
         for agent, value in enumerate(self.initial, start=1):
             _require_finite(f"[network] initial[{agent}]", value)
@@ -183,13 +184,16 @@ class Scenario:
                 raise ScenarioError(
                     f"{table} is made for {count} edges, but [network] lists {edge_count}; they must be the same edges."
                 )
-        domains = [("[switching]", self.switching.domain)]
-        domains += [(f"[weights] of edge {k}", wave.domain) for k, wave in enumerate(self.weights.waveforms, start=1)]
-        for table, (first, last) in domains:
+        domains = [("[switching]", "dwell", self.switching.domain)]
+        domains += [
+            (f"[weights] of edge {k}", "its times", wave.domain)
+            for k, wave in enumerate(self.weights.waveforms, start=1)
+        ]
+        for table, key, (first, last) in domains:
             if first > 0 or last < self.stop_time:
                 raise ScenarioError(
                     f"{table} is given from {first:.6g} s to {last:.6g} s, but the run goes from 0 s to "
-                    f"{self.stop_time:.6g} s; let it cover the run or repeat."
+                    f"{self.stop_time:.6g} s; let {key} cover the run, set repeat = true or change stop_time."
                 )
 
     @cached_property

@@ -2,13 +2,17 @@
 
 import difflib
 import enum
-import math
 from collections.abc import Iterable, Mapping
 from typing import Any, TypeVar
+
+from hybrid_model.consensus.shown import shown
 
 __all__ = ["ScenarioError", "Table", "suggestion"]
 
 Choice = TypeVar("Choice", bound=enum.Enum)
+
+_LARGEST = 1e300
+_LIMIT = 2**63
 
 
 class ScenarioError(ValueError):
@@ -47,16 +51,20 @@ class Table:
         for key in entries:
             if key not in names:
                 raise ScenarioError(
-                    f"{name} has the unknown key '{key}'.{suggestion(key, names)} Known keys: {', '.join(names)}."
+                    f"{name} has the unknown key {shown(key)}.{suggestion(key, names)} Known keys: {', '.join(names)}."
                 )
 
     def __contains__(self, key: str) -> bool:
         """Whether the key is given."""
         return key in self._entries
 
+    def lists(self, key: str) -> bool:
+        """Whether the key is given, as a list."""
+        return isinstance(self._entries.get(key), list)
+
     def error(self, key: str, value: object, rule: str) -> ScenarioError:
         """The error for a value that breaks a rule ("it must ...")."""
-        return ScenarioError(f"{self.name} {key} is {_shown(value)}; it {rule}.")
+        return ScenarioError(f"{self.name} {key} is {shown(value)}; it {rule}.")
 
     def raw(self, key: str, rule: str) -> Any:
         """The entry as parsed; ScenarioError if it is missing."""
@@ -80,7 +88,8 @@ class Table:
         rule = "must be one of " + ", ".join(f"'{name}'" for name in names)
         value = self.raw(key, rule)
         if not isinstance(value, str) or value not in names:
-            raise ScenarioError(f"{self.name} {key} is {_shown(value)}; it {rule}.{suggestion(str(value), names)}")
+            near = suggestion(value, names) if isinstance(value, str) else ""
+            raise ScenarioError(f"{self.name} {key} is {shown(value)}; it {rule}.{near}")
         return choices(value)
 
     def number(self, key: str, default: float | None = None) -> float:
@@ -137,17 +146,17 @@ class Table:
 
     def per_edge(self, key: str, edge_count: int, default: float | None = None) -> tuple[float, ...]:
         """A number for each edge: a list of `edge_count` numbers, or one number that stands for all edges."""
-        return self.per_item(key, edge_count, "edge", default)
+        return self.per_item(key, edge_count, "edges", default)
 
     def per_item(self, key: str, count: int, of_what: str, default: float | None = None) -> tuple[float, ...]:
         """A number for each of `count` things, or one number that stands for all."""
-        if not isinstance(self._entries.get(key), list):
+        if not self.lists(key):
             return (self.number(key, default),) * count
         values = self.numbers(key)
         if len(values) != count:
             raise ScenarioError(
-                f"{self.name} {key} lists {len(values)} numbers for {count} {of_what}s; "
-                f"give one number for each {of_what}, or a single number for all."
+                f"{self.name} {key} lists {len(values)} numbers for {count} {of_what}; "
+                "give one number for each of them, or a single number for all."
             )
         return values
 
@@ -162,18 +171,14 @@ class Table:
         # A TOML boolean is an int to Python; "gain = true" is a slip, not the number 1.
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.error(key, value, "must be a number")
-        if abs(value) > 1e300 or not math.isfinite(value):
+        # Not a number compares with nothing; whole numbers may be too large for a float.
+        if not abs(value) <= _LARGEST:
             raise self.error(key, value, "must be a finite number")
         return float(value)
 
     def _as_whole_number(self, key: str, value: object) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
             raise self.error(key, value, "must be a whole number")
+        if not -_LIMIT <= value < _LIMIT:
+            raise self.error(key, value, "must be a whole number of at most 64 bits, as TOML has it")
         return value
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    shown = f"'{value}'" if isinstance(value, str) else str(value)
-    return shown if len(shown) <= 60 else shown[:57] + "..."

@@ -177,7 +177,7 @@ class TestSwitching:
         (
             "switching",
             {"kind": "sequence", "dwell": [1, 2], "active": [[1], [2]]},
-            r"\[switching\] is given from 0 s to 3 s, but the run goes from 0 s to 10 s; let it cover the run or rep",
+            r"\[switching\] is given from 0 s to 3 s, but the run goes from 0 s to 10 s; let dwell cover the run",
         ),
         ("switching", {"kind": "markov", "active": [[1]], "seed": 1}, "has no 'shortest'"),
         (

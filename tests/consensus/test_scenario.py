@@ -212,7 +212,7 @@ class TestValues:
         (
             "weights",
             {"kind": "constant", "value": -1.0},
-            r"\[weights\] of edge 1: the constant weight is -1.0; it must not be negative",
+            r"\[weights\] value is -1.0; it must not be negative",
         ),
         ("switching.dwell", 0.0, "dwell is 0.0; it must be a positive"),
         ("switching.dwell", MISSING, "has no 'dwell'"),
