@@ -1,19 +1,42 @@
-"""Compile an exported model with the native runtime and package it as an FMU.
+"""Compile an exported model with the native runtime, for this machine or for others.
 
-The compiler is called with argument lists, never through a shell.  The same sources give the same bytes: there is no
-debug information (it would hold paths), and archives have fixed dates and sorted names.
+The same sources give the same bytes: there is no debug information (it would hold paths), files are linked under a
+fixed name, and no date is written.  The runtime's objects do not depend on the model; a process compiles them once.
 """
 
+from __future__ import annotations
+
+import hashlib
 import importlib.util
 import os
 import shutil
-import subprocess
-import sys
 import tempfile
-import zipfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+
+from fmu.compiler import Task, compiler_identity, find_compiler, is_zig, run_all, zig_compiler
+from fmu.errors import BuildError
+from fmu.package import ARCHIVE_DATE, check_target, package, replacing
+from fmu.platforms import PLATFORMS, Platform, chosen_platforms, library_members, this_platform
+
+__all__ = [
+    "ARCHIVE_DATE",
+    "COMMON_FLAGS",
+    "GENERATED_FLAGS",
+    "PLATFORMS",
+    "RUNTIME",
+    "STRICT_FLAGS",
+    "BuildError",
+    "binaries",
+    "check_target",
+    "compile_fmu",
+    "find_compiler",
+    "fmi_headers",
+    "package",
+    "runtime_sources",
+]
 
 RUNTIME = Path(__file__).resolve().parent / "runtime"
 """Folder of the runtime's C sources and headers."""
@@ -21,11 +44,12 @@ RUNTIME = Path(__file__).resolve().parent / "runtime"
 COMMON_FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 STRICT_FLAGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wformat=2", "-Werror")
 GENERATED_FLAGS = ("-Wall", "-Wno-unused-function", "-Wno-unused-variable", "-Wno-unused-but-set-variable")
-ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)
 
+_LINUX_LINK = "-Wl,-z,defs,-z,noexecstack,-z,relro,-z,now"
+_OBJECT_LIMIT = 500
 
-class BuildError(RuntimeError):
-    """An FMU could not be compiled or packaged; the message says why and what to do."""
+_objects: dict[str, bytes] = {}
+_objects_lock = threading.Lock()
 
 
 def runtime_sources() -> list[Path]:
@@ -62,76 +86,48 @@ def fmi_headers() -> Path:
     )
 
 
-def find_compiler() -> list[str]:
-    """Find a C compiler.
+def binaries(
+    sources: Sequence[Path],
+    include_dirs: Iterable[Path],
+    identifier: str,
+    *,
+    fmi: str,
+    platforms: Iterable[str] | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, bytes]:
+    """Compile C sources for platforms and name the libraries as members of an FMU's archive.
+
+    The system's compiler builds for this machine alone.  As soon as another platform is wanted, the package ziglang
+    builds for all of them, this machine's included, so that the file runs on other and older machines.
+
+    Parameters
+    ----------
+    sources : sequence of Path
+        C files, as for `compile_fmu`.
+    include_dirs : iterable of Path
+        Folders for header files.
+    identifier : str
+        The model identifier, which libraries are named after.
+    fmi : str
+        ``"2.0"`` or ``"3.0"``, which name the folders of platforms differently.
+    platforms : iterable of str, optional
+        Names as in FMI 3, for example ``x86_64-linux``; this machine's if not given.
+    progress : callable, optional
+        Told in a few words what is being done.
 
     Returns
     -------
-    list of str
-        The command to which arguments are appended: the value of the environment variable ``CC`` if it is set,
-        else the first of ``cc``, ``gcc``, ``clang`` on the path, else the C compiler of the package ziglang.
+    dict of str to bytes
+        Archive members below ``binaries/``.
 
     Raises
     ------
     BuildError
-        If ``CC`` names no executable, or if there is no compiler at all.
+        As for `compile_fmu`; if a platform is unknown; or if ziglang is needed and not installed.
     """
-    chosen = os.environ.get("CC", "").split()
-    if chosen:
-        if shutil.which(chosen[0]) is None:
-            raise BuildError(
-                f"The environment variable CC is '{' '.join(chosen)}', but there is no program '{chosen[0]}'. "
-                "Remedy: let CC name an installed C compiler, or unset it."
-            )
-        return chosen
-    for name in ("cc", "gcc", "clang"):
-        path = shutil.which(name)
-        if path is not None:
-            return [path]
-    if importlib.util.find_spec("ziglang") is not None:
-        return [sys.executable, "-m", "ziglang", "cc"]
-    raise BuildError(
-        "No C compiler was found: neither CC nor cc, gcc, clang, nor the package ziglang. "
-        "Remedy: install a C compiler (for example the package gcc of the system), or: pip install ziglang."
-    )
-
-
-def _run(command: Sequence[str], folder: Path, task: str) -> None:
-    """Run a command in a folder; its output becomes the error's message."""
-    try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", check=False)
-    except OSError as error:
-        raise BuildError(
-            f"The compiler '{command[0]}' could not be started to {task}: {error.strerror}. "
-            "Remedy: check the environment variable CC."
-        ) from error
-    if done.returncode != 0:
-        report = (done.stderr or done.stdout).strip()[-4000:]
-        raise BuildError(
-            f"The compiler '{command[0]}' failed to {task} (status {done.returncode}). "
-            f"Remedy: correct what its report says:\n{report}"
-        )
-
-
-def _is_runtime(source: Path) -> bool:
-    return source.parent == RUNTIME
-
-
-@contextmanager
-def _replacing(target: Path) -> Iterator[Path]:
-    """Yield a temporary path beside the target that replaces it on success and disappears on failure."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".part", dir=target.parent)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        mask = os.umask(0)
-        os.umask(mask)
-        temporary.chmod(0o666 & ~mask)
-        os.replace(temporary, target)
-    finally:
-        temporary.unlink(missing_ok=True)
+    chosen = chosen_platforms(platforms)
+    libraries = _build(_checked(sources), _folders(include_dirs), _compiler_for(chosen), chosen, progress)
+    return library_members(identifier, fmi, libraries)
 
 
 def compile_fmu(
@@ -139,6 +135,7 @@ def compile_fmu(
     include_dirs: Iterable[Path],
     output: Path,
     compiler: Sequence[str] | None = None,
+    platform: str | None = None,
 ) -> Path:
     """Compile C sources to a shared library that exports the FMI functions and nothing else.
 
@@ -151,7 +148,9 @@ def compile_fmu(
     output : Path
         The library to write; it appears only when it is complete.
     compiler : sequence of str, optional
-        The compiler's command; found by `find_compiler` if not given.
+        The compiler's command; if not given, found by `find_compiler` for this machine, that of ziglang for others.
+    platform : str, optional
+        Name as in FMI 3; this machine's if not given.
 
     Returns
     -------
@@ -161,8 +160,27 @@ def compile_fmu(
     Raises
     ------
     BuildError
-        If a source is missing, two have the same name, there is no compiler, or it fails.
+        If a source is missing, two have the same name, there is no compiler, it fails, or `output` cannot be written.
     """
+    [target] = chosen = chosen_platforms(None if platform is None else [platform])
+    files = _checked(sources)
+    command = list(compiler) if compiler is not None else _compiler_for(chosen)
+    library = _build(files, _folders(include_dirs), command, chosen)[target]
+    with replacing(output, mode=0o777) as temporary:
+        temporary.write_bytes(library)
+    return output
+
+
+def _compiler_for(platforms: Sequence[Platform]) -> list[str]:
+    """Return the system's compiler for this machine alone, else the one that builds for all."""
+    try:
+        here = tuple(platforms) == (this_platform(),)
+    except BuildError:
+        here = False
+    return find_compiler() if here else zig_compiler()
+
+
+def _checked(sources: Sequence[Path]) -> list[Path]:
     files = [Path(source).resolve() for source in sources]
     for file in files:
         if not file.is_file():
@@ -170,86 +188,116 @@ def compile_fmu(
     names = [file.stem for file in files]
     if not names or len(set(names)) != len(names):
         raise BuildError(f"The C sources {sorted(names)} must be at least one and differ in name. Remedy: rename them.")
-    command = list(compiler) if compiler is not None else find_compiler()
-    # Foreign headers are system headers, so that strict warnings speak of our own code only.
-    includes = [flag for folder in include_dirs for flag in ("-isystem", str(Path(folder).resolve()))]
+    return files
+
+
+def _folders(include_dirs: Iterable[Path]) -> list[Path]:
+    return [Path(folder).resolve() for folder in include_dirs]
+
+
+@dataclass(frozen=True)
+class _Object:
+    """A source to be compiled for a platform, the file it becomes, and its key if it is worth keeping."""
+
+    task: Task
+    file: Path
+    key: str | None
+
+
+def _build(
+    sources: Sequence[Path],
+    include_dirs: Sequence[Path],
+    compiler: Sequence[str],
+    platforms: Sequence[Platform],
+    progress: Callable[[str], None] | None = None,
+) -> dict[Platform, bytes]:
+    """Compile and link for each platform; nothing is left on the disk."""
+    identity = compiler_identity(compiler)
+    # Compilers run in folders of ours: a relative path would not be found there.
+    command = [os.path.abspath(shutil.which(compiler[0]) or compiler[0]), *compiler[1:]]
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as name:
-        folder = Path(name)
-        for file in files:
-            warnings = STRICT_FLAGS if _is_runtime(file) else GENERATED_FLAGS
-            arguments = [*COMMON_FLAGS, *warnings, f"-I{RUNTIME}", *includes, "-c", str(file), "-o", f"{file.stem}.o"]
-            _run([*command, *arguments], folder, f"compile '{file.name}'")
-        # Names of files would otherwise stay in the symbol table.
-        strip = [] if sys.platform == "darwin" else ["-s"]
-        objects = [f"{stem}.o" for stem in names]
-        _run([*command, "-shared", *strip, *objects, "-lm", "-o", "library"], folder, f"link '{output.name}'")
-        with _replacing(output) as temporary:
-            shutil.copyfile(folder / "library", temporary)
-        output.chmod(output.stat().st_mode | 0o111)
-    return output
+        scratch = Path(name).resolve()
+        toolchains = {platform: [*command, *_target(command, platform)] for platform in platforms}
+        headers = _digest([header for folder in (RUNTIME, *include_dirs) for header in sorted(folder.rglob("*.h"))])
+        objects: list[_Object] = []
+        for platform, toolchain in toolchains.items():
+            folder = scratch / platform.name
+            folder.mkdir()
+            for source in sources:
+                objects.append(_object(source, include_dirs, toolchain, folder, identity + headers))
+        _compile(objects, scratch, progress)
+        if progress is not None:
+            progress(f"linking for {', '.join(platform.name for platform in platforms)}")
+        links = [_link(toolchain, platform, sources, scratch) for platform, toolchain in toolchains.items()]
+        run_all(links, scratch, progress)
+        return {platform: (scratch / platform.name / _library_name(platform)).read_bytes() for platform in platforms}
 
 
-def _entries(content: Path | Mapping[str, bytes | Path]) -> dict[str, bytes]:
-    """Return the bytes of each archive member by its name."""
-    if isinstance(content, Path):
-        if not content.is_dir():
-            raise BuildError(f"The folder '{content}' to be packaged does not exist. Remedy: export into it first.")
-        files = [path for path in content.rglob("*") if path.is_file()]
-        return {path.relative_to(content).as_posix(): path.read_bytes() for path in files}
-    return {name: item.read_bytes() if isinstance(item, Path) else item for name, item in content.items()}
+def _target(command: Sequence[str], platform: Platform) -> list[str]:
+    # Without a target zig builds for the very processor of this machine.
+    return ["-target", platform.zig_target, "-mcpu=baseline"] if is_zig(command) else []
 
 
-def _check_name(name: str) -> None:
-    parts = name.split("/")
-    if name == "" or "\\" in name or ":" in name or any(part in ("", ".", "..") for part in parts):
-        raise BuildError(
-            f"The archive member '{name}' is not a plain relative path; an FMU must stay within its folder. "
-            "Remedy: use names like 'binaries/x86_64-linux/Model.so'."
-        )
+def _object(source: Path, include_dirs: Sequence[Path], command: Sequence[str], folder: Path, basis: str) -> _Object:
+    own = source.parent == RUNTIME
+    # Foreign headers are system headers, so that strict warnings speak of our own code only.
+    includes = [flag for place in include_dirs for flag in ("-isystem", str(place))]
+    flags = [*COMMON_FLAGS, *(STRICT_FLAGS if own else GENERATED_FLAGS)]
+    file = folder / _object_name(source)
+    arguments = [*command, *flags, f"-I{RUNTIME}", *includes, "-c", str(source), "-o", _object_name(source)]
+    task = Task(tuple(arguments), folder, f"compile '{source.name}' for {folder.name}")
+    # The arguments hold the source's path, and so its name.
+    key = hashlib.sha256(repr((basis, arguments, _digest([source]))).encode()).hexdigest() if own else None
+    return _Object(task, file, key)
 
 
-def package(content: Path | Mapping[str, bytes | Path], fmu_path: Path) -> Path:
-    """Write an FMU archive with fixed dates and sorted names, all at once or not at all.
+def _digest(files: Iterable[Path]) -> str:
+    digest = hashlib.sha256()
+    for file in files:
+        content = file.read_bytes()
+        digest.update(f"{file.name}\0{len(content)}\0".encode() + content)
+    return digest.hexdigest()
 
-    Parameters
-    ----------
-    content : Path or mapping of str to bytes or Path
-        A folder, or the members' names (with ``/``) and what they hold: bytes, or the path of a file.
-    fmu_path : Path
-        The archive to write.  What was there stays until the new one is complete.
 
-    Returns
-    -------
-    Path
-        The archive, that is `fmu_path`.
+def _compile(objects: Sequence[_Object], scratch: Path, progress: Callable[[str], None] | None) -> None:
+    """Make the object files: those that this process has made before are copied, the others compiled."""
+    with _objects_lock:
+        known = {entry.key: _objects[entry.key] for entry in objects if entry.key in _objects}
+    missing = [entry for entry in objects if entry.key not in known]
+    if progress is not None:
+        progress(f"compiling {len(missing)} of {len(objects)} C files")
+    run_all([entry.task for entry in missing], scratch)
+    for entry in objects:
+        if entry.key in known:
+            entry.file.write_bytes(known[entry.key])
+    made = {entry.key: entry.file.read_bytes() for entry in missing if entry.key is not None}
+    with _objects_lock:
+        if len(_objects) > _OBJECT_LIMIT:
+            _objects.clear()
+        _objects.update(made)
 
-    Raises
-    ------
-    BuildError
-        If ``modelDescription.xml`` is missing, a name is not a plain relative path, or a file cannot be read.
-    """
-    try:
-        members = _entries(content)
-    except OSError as error:
-        raise BuildError(
-            f"'{error.filename}' cannot be read for the FMU '{fmu_path.name}': {error.strerror}. "
-            "Remedy: check that the file exists and may be read."
-        ) from error
-    for name in members:
-        _check_name(name)
-    if "modelDescription.xml" not in members:
-        raise BuildError(
-            f"The FMU '{fmu_path.name}' has no modelDescription.xml; every FMU needs one at its top. "
-            "Remedy: add the model description to the content."
-        )
-    with (
-        _replacing(fmu_path) as temporary,
-        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive,
-    ):
-        for name in sorted(members):
-            entry = zipfile.ZipInfo(name, ARCHIVE_DATE)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.create_system = 3
-            entry.external_attr = (0o100755 if name.startswith("binaries/") else 0o100644) << 16
-            archive.writestr(entry, members[name])
-    return fmu_path
+
+def _object_name(source: Path) -> str:
+    # With a folder, because a name may begin like an option.
+    return f"./{source.stem}.o"
+
+
+def _library_name(platform: Platform) -> str:
+    # Linkers of Windows and macOS write the name into the library.
+    return f"model{platform.extension}"
+
+
+def _link(command: Sequence[str], platform: Platform, sources: Sequence[Path], scratch: Path) -> Task:
+    zig = is_zig(command)
+    # Names of files would otherwise stay in the symbol table; Apple's own linker has no such option.
+    flags = ["-shared", *(["-s"] if zig or platform.system != "darwin" else [])]
+    if platform.system == "linux":
+        # zig refuses text relocations without being asked.
+        flags.append(_LINUX_LINK if zig else f"{_LINUX_LINK},-z,text")
+    elif platform.system == "windows":
+        flags.append("-Wl,-Brepro" if zig else "-Wl,--no-insert-timestamp")
+    objects = [_object_name(source) for source in sources]
+    arguments = (*command, *flags, *objects, "-lm", "-o", _library_name(platform))
+    return Task(
+        arguments, scratch / platform.name, f"link the library for {platform.name}", f"built for {platform.name}"
+    )

@@ -110,7 +110,7 @@ def test_failed_link_keeps_the_old_library(tmp_path: Path) -> None:
     source.write_text("int twice = 2;\n")
     target = tmp_path / "Model.so"
     target.write_bytes(b"old")
-    with pytest.raises(BuildError, match=r"link 'Model.so'"):
+    with pytest.raises(BuildError, match=r"(?s)link the library.*twice"):
         compile_fmu([source, tmp_path / "other.c"], [], target)
     assert target.read_bytes() == b"old"
     assert leftovers(tmp_path) == {"model.c", "other.c", "Model.so"}
