@@ -12,6 +12,8 @@ velocities is conserved, whatever was broadcast, so the mean position moves on e
 
 from __future__ import annotations
 
+from numbers import Real
+
 import numpy as np
 import numpy.typing as npt
 
@@ -19,6 +21,7 @@ import hybrid_model as hm
 from hybrid_model.consensus.edge_blocks import switching_block, weights_block
 from hybrid_model.consensus.network import agent_name, edges_of, other_end
 from hybrid_model.consensus.scenario_data import Scenario
+from hybrid_model.consensus.start_states import start_numbers
 from hybrid_model.consensus.tables import ScenarioError
 from hybrid_model.consensus.thresholds import mixed_threshold
 from hybrid_model.consensus.vector_agents import require_norm_trigger
@@ -114,13 +117,9 @@ def double_integrator_agents(
         If the velocities or the damping are not possible, or the trigger or the channel is of another kind.
     """
     require_norm_trigger(scenario, "double integrators")
-    speeds = np.asarray(velocities, dtype=np.float64)
     count = scenario.network.agents
-    if speeds.shape != (count,):
-        raise ScenarioError(
-            f"the velocities have the shape {speeds.shape} for {count} agents; give one for each agent."
-        )
-    if not (np.isfinite(damping) and damping > 0):
+    speeds = start_numbers("velocities", velocities, count)
+    if not (isinstance(damping, Real) and 0 < damping < np.inf):
         raise ScenarioError(f"the damping mu is {damping}; it must be a positive, finite number of seconds.")
     return {agent_name(i): _agent(scenario, i, float(speeds[i - 1]), damping) for i in range(1, count + 1)}
 

@@ -10,6 +10,7 @@ from hybrid_model.consensus.agents import agent
 from hybrid_model.consensus.edge_blocks import switching_block, weights_block
 from hybrid_model.consensus.network import agent_name, broadcast_wires, edges_of
 from hybrid_model.consensus.scenario_data import Scenario, TriggerKind
+from hybrid_model.consensus.start_states import start_vectors
 from hybrid_model.consensus.tables import ScenarioError
 from hybrid_model.consensus.thresholds import mixed_threshold
 from hybrid_model.variables import Value
@@ -87,15 +88,11 @@ def vector_agents(scenario: Scenario, initial: npt.ArrayLike) -> dict[str, hm.Co
     Raises
     ------
     ScenarioError
-        If the initial states have another shape, or the trigger or the channel is of another kind.
+        If the initial states have another shape or are not all finite numbers, or the trigger or the channel is of
+        another kind.
     """
     require_norm_trigger(scenario, "agents in R^d")
-    states = np.asarray(initial, dtype=np.float64)
-    if states.ndim != 2 or len(states) != scenario.network.agents:
-        raise ScenarioError(
-            f"the initial states have the shape {states.shape} for {scenario.network.agents} agents; give an array of "
-            "one row for each agent."
-        )
+    states = start_vectors("initial states", initial, scenario.network.agents)
     trigger, found = scenario.trigger, {}
     for i, state in enumerate(states, start=1):
         edges = edges_of(scenario, i)

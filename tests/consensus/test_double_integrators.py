@@ -119,6 +119,16 @@ def test_the_error_stays_below_the_threshold():
     ("changes", "velocities", "damping", "message"),
     [
         ({}, [1.0], 1.0, r"the velocities have the shape \(1,\) for 3 agents"),
+        ({}, [1.0, np.nan, 0.0], 1.0, "the velocities of agent 2 hold nan; they must be finite"),
+        (
+            {},
+            [1.0, [2.0, 3.0], 0.0],
+            1.0,
+            "the velocities have rows of different lengths; give one number for each agent",
+        ),
+        ({}, ["a", "b", "c"], 1.0, "the velocities are not all real numbers"),
+        ({}, VELOCITIES, "2", "the damping mu is 2; it must be a positive"),
+        ({}, VELOCITIES, np.nan, "the damping mu is nan; it must be a positive"),
         ({}, VELOCITIES, 0.0, "the damping mu is 0.0; it must be a positive"),
         ({"trigger": Trigger(TriggerKind.CONTINUOUS)}, VELOCITIES, 1.0, "kind is 'continuous'; for double integrators"),
         (

@@ -109,6 +109,21 @@ def test_an_agent_without_neighbours_stays():
     [
         ({}, [1.0, 2.0, 3.0], r"shape \(3,\) for 3 agents; give an array of one row"),
         ({}, STARTS[:2], r"shape \(2, 3\) for 3 agents"),
+        ({}, [[1.0, 2.0], [3.0], [4.0, 5.0]], "the initial states have rows of different lengths; give one row of num"),
+        ({}, [[1.0, 2.0], 3.0, [4.0, 5.0]], "the initial states have rows of different lengths"),
+        (
+            {},
+            [[1.0, 2.0], [3.0, np.nan], [4.0, 5.0]],
+            r"initial states of agent 2 hold \[3.0, nan\]; they must be finite",
+        ),
+        ({}, [[np.inf], [0], [1]], r"initial states of agent 1 hold \[inf\]"),
+        ({}, [["a"], ["b"], ["c"]], "the initial states are not all real numbers"),
+        ({}, [[1j], [0], [1]], "the initial states are not all real numbers"),
+        ({}, [[True], [False], [True]], "the initial states are not all real numbers"),
+        ({}, [[10**400], [0], [1]], "the initial states are not all real numbers"),
+        ({}, None, "the initial states are not all real numbers"),
+        ({}, [[], [], []], r"shape \(3, 0\) for 3 agents; .* at least one number"),
+        ({}, [], r"shape \(0,\) for 3 agents"),
         (
             {"trigger": Trigger(TriggerKind.PERIODIC, period=1.0)},
             STARTS,
