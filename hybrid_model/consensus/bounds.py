@@ -21,7 +21,10 @@ from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
 from hybrid_model.consensus.worst_case import WorstCase
 
-__all__ = ["Bounds"]
+__all__ = ["Bounds", "is_lost", "with_threshold"]
+
+_LOST = 1e-9
+"""A Floquet multiplier below this has lost digits: the monodromy matrix is known to about 1e-14."""
 
 
 class _PartGap(Protocol):
@@ -66,10 +69,22 @@ class Bounds:
         """Rate [1/s] of the tree-free gamma* (audit, section 3 (ii)); 0.0 without persistent excitation."""
         return rate_of_contraction(improved_contraction(self.analysis), self.analysis.window)
 
-    @property
+    @cached_property
     def floquet_rate(self) -> float | None:
         """Exact rate [1/s]; None without a period."""
-        return None if self.analysis.spectrum is None else self.analysis.spectrum.rate
+        spectrum = self.analysis.spectrum
+        if spectrum is None or not is_lost(self.analysis):
+            return None if spectrum is None else spectrum.rate
+        # After so long a period the monodromy matrix is made of rounding: take the product of scaled cells.
+        return self.analysis.cells.rate()
+
+    @property
+    def floquet_overshoot(self) -> float | None:
+        """``sup ||phi(t, s)|| e^{r (t - s)}`` with the exact rate r; None without a period."""
+        analysis, rate = self.analysis, self.floquet_rate
+        if analysis.spectrum is None or rate is None or rate == analysis.spectrum.rate:
+            return analysis.overshoot if analysis.is_periodic else None
+        return analysis.cells.overshoot(rate)
 
     # --- errors ------------------------------------------------------------------------------------------------------
 
@@ -79,14 +94,34 @@ class Bounds:
         scenario = self.analysis.scenario
         if scenario.trigger.kind is not TriggerKind.SAMPLED or not scenario.channel.ideal:
             return envelope(scenario)
-        decay = scenario.trigger.decay
-        worst, energy = self._worst(decay), energy_radius(self.analysis, decay)
-        if worst is None or energy is None:
+        reach = self._sampled_reach
+        if reach is None:
             return None
+        decay = scenario.trigger.decay
         degrees = self.analysis.moved_degrees().tolist()
         omega = float(np.max(self.analysis.largest_weights))
-        c = sampled_threshold(scenario, min(worst.radius * worst.cover, energy), self._peaks(decay)[0], degrees, omega)
+        c = sampled_threshold(scenario, reach, self._peaks(decay)[0], degrees, omega)
         return None if c is None else ((c, decay),)
+
+    @property
+    def _sampled_reach(self) -> float | None:
+        """R for the threshold ``exp(-beta t)``: the lesser of the exact radius and the energy bound."""
+        decay = self.analysis.scenario.trigger.decay
+        worst, energy = self._worst(decay), energy_radius(self.analysis, decay)
+        return None if worst is None or energy is None else min(worst.radius * worst.cover, energy)
+
+    @property
+    def sampled_slope(self) -> float | None:
+        """``e^{beta h} h k omega (sqrt(d) R + 2 d)``: bounded errors need it below 1 (audit, section 11, 7).
+
+        None without a radius R.
+        """
+        scenario, reach = self.analysis.scenario, self._sampled_reach
+        if reach is None:
+            return None
+        trigger, degree = scenario.trigger, int(np.max(self.analysis.moved_degrees()))
+        speed = trigger.period * scenario.network.gain * float(np.max(self.analysis.largest_weights))
+        return math.exp(trigger.decay * trigger.period) * speed * (math.sqrt(degree) * reach + 2 * degree)
 
     def _worst(self, decay: float) -> WorstCase | None:
         rate = self.floquet_rate
@@ -150,6 +185,11 @@ class Bounds:
     def _exact_part(self, decay: float) -> float | None:
         worst = self._worst(decay)
         return None if worst is None else worst.radius
+
+    @property
+    def exact_worst(self) -> WorstCase | None:
+        """The worst case behind the exact radius, for the slowest part of the errors; None without one."""
+        return self._worst(self.slowest[0][1]) if self.slowest else None
 
     def _sum(self, part: Callable[[float], float | None]) -> float | None:
         if self.parts is None:
@@ -276,6 +316,12 @@ class Bounds:
 
     def _part_bound(self, c: float, decay: float) -> ConvergenceBound:
         return self._bound(with_threshold(self.analysis.scenario, c, decay), BoundForm.VALID)
+
+
+def is_lost(analysis: Analysis) -> bool:
+    """Whether a cycle is so long that all Floquet multipliers have lost digits."""
+    spectrum = analysis.spectrum
+    return spectrum is not None and not analysis.is_constant and bool(abs(spectrum.multipliers[0]) < _LOST)
 
 
 def with_threshold(scenario: Scenario, c: float, decay: float) -> Scenario:

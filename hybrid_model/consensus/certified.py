@@ -9,7 +9,15 @@ from hybrid_model.consensus.bounds import Bounds
 from hybrid_model.consensus.hypotheses import PAPER_LAWS
 from hybrid_model.consensus.observed import Observation
 
-__all__ = ["Certified", "certified_values"]
+__all__ = ["FORMS", "Certified", "certified_values"]
+
+FORMS = {
+    "rate": ("printed", "valid", "improved", "floquet"),
+    "transient": ("printed", "valid", "improved", "floquet"),
+    "radius": ("printed", "valid", "improved", "energy", "exact", "observed"),
+    "min_gap": ("printed", "valid", "improved", "observed"),
+}
+"""Every quantity in all its forms, in the order of `certified_values`."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +53,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
     decay = bounds.slowest[0][1] if bounds.slowest else 0.0
     ball = "unit of x" if decay == 0 else f"unit of x, times exp(-{decay:.6g} t)"
     union, tree, errors = "connected union", "exciting tree", "bounded errors"
-    paper, periodic = "trigger of the paper", "periodic weights"
+    paper, periodic, excited = "trigger of the paper", "periodic weights", "persistent excitation"
 
     def entries(quantity: str, unit: str, *rows: tuple[str, float | None, str, tuple[str, ...]]) -> list[Certified]:
         return [Certified(quantity, form, value, unit, source, needs) for form, value, source, needs in rows]
@@ -57,8 +65,8 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
         "rate",
         "1/s",
         ("printed", bounds.printed.rate or None, "paper, theorem 1 (false as printed: audit, section 3)", (tree,)),
-        ("valid", bounds.valid.rate or None, "audit, section 3 (i)", (union,)),
-        ("improved", improved or None, "audit, section 3 (ii)", (union,)),
+        ("valid", bounds.valid.rate or None, "audit, section 3 (i)", (union, excited)),
+        ("improved", improved or None, "audit, section 3 (ii)", (union, excited)),
         ("floquet", bounds.floquet_rate, "audit, section 7", (union, periodic)),
     )
     transients = entries(
@@ -72,7 +80,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
             "audit, section 3, in the coordinates xi",
             (union,),
         ),
-        ("floquet", analysis.overshoot if analysis.is_periodic else None, "audit, section 7", (union, periodic)),
+        ("floquet", bounds.floquet_overshoot, "audit, section 7", (union, periodic)),
     )
     radii = entries(
         "radius",
@@ -86,7 +94,12 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
         ("valid", bounds.valid_radius, "audit, section 5.2", (union, errors, "beta below the valid rate")),
         ("improved", bounds.improved_radius, "audit, end of section 5.2", (union, errors)),
         ("energy", bounds.energy_radius, "audit, section 5.3", (union, errors, below)),
-        ("exact", bounds.exact_radius, "audit, section 7", (union, errors, *([below] if analysis.is_periodic else []))),
+        (
+            "exact",
+            bounds.exact_radius,
+            "audit, section 7; reached from below, see the notes",
+            (union, errors, *([below] if analysis.is_periodic else [])),
+        ),
         ("observed", None if seen is None else seen.radius, "run", ()),
     )
     gaps = entries(

@@ -8,9 +8,9 @@ from typing import Any
 from hybrid_model import HybridArc
 from hybrid_model.consensus.analysis import analyse, connected_parts
 from hybrid_model.consensus.bounds import Bounds
-from hybrid_model.consensus.certified import Certified, certified_values
+from hybrid_model.consensus.certified import FORMS, Certified, certified_values
 from hybrid_model.consensus.certify_notes import scenario_notes
-from hybrid_model.consensus.hypotheses import Hypothesis, network_hypotheses, rate_hypotheses
+from hybrid_model.consensus.hypotheses import Hypothesis, bound_hypotheses, network_hypotheses
 from hybrid_model.consensus.observed import observe
 from hybrid_model.consensus.parts import part_scenarios
 from hybrid_model.consensus.report import run_report
@@ -100,7 +100,10 @@ def certify(
     decay = None if bounds.exact_radius is None else min((beta for _, beta in bounds.slowest), default=0.0)
     seen = None if arc is None else observe(analysis, arc, decay)
     values = certified_values(bounds, seen)
-    hypotheses = (*general, *rate_hypotheses(analysis, bounds.printed.rate, bounds.valid.rate, bounds.improved_rate))
+    further = bound_hypotheses(bounds)
+    # What the bounds show takes the place of what was known without them.
+    known = {hypothesis.name for hypothesis in further}
+    hypotheses = (*(hypothesis for hypothesis in general if hypothesis.name not in known), *further)
     constants = analysis.tree_weights
     return Certificates(
         scenario,
@@ -118,7 +121,13 @@ def _in_parts(
     """No consensus of all: what holds for each part by itself."""
     notes = [hypotheses[0].detail + " There is no consensus of all agents; each part keeps its own mean."]
     gaps: dict[str, list[float | None]] = {"valid": [], "improved": []}
+    touched = {agent for edge in _positive_edges(scenario, cycle) for agent in edge}
     for part, alone in part_scenarios(scenario, cycle):
+        if alone is None and part[0] in touched:
+            notes.append(f"Agent {part[0]} by itself: its edges count as absent, and nothing is certified about it.")
+            for found in gaps.values():
+                found.append(None)
+            continue
         if alone is None:
             notes.append(f"Agent {part[0]} never moves and never broadcasts.")
             continue
@@ -127,17 +136,24 @@ def _in_parts(
             found.append(inner.value("min_gap", form))
         rate, radius = inner.value("rate", "floquet"), inner.value("radius", "exact")
         gap = inner.value("min_gap", "improved")
+        who = f"Agents {', '.join(map(str, part))} by themselves:"
         notes.append(
-            f"Agents {', '.join(map(str, part))} by themselves: Floquet rate {_text(rate, '1/s')}, exact radius over "
-            f"their own edges {_text(radius, 'units of x')}, minimum gap {_text(gap, 's')}."
+            f"{who} Floquet rate {_text(rate, '1/s')}, exact radius over their own edges "
+            f"{_text(radius, 'units of x')}, minimum gap {_text(gap, 's')}."
         )
+        own = {hypothesis.name for hypothesis in hypotheses if not hypothesis.holds}
+        notes += [
+            f"{who} hypothesis '{h.name}' fails: {h.detail}"
+            for h in inner.hypotheses
+            if not h.holds and h.name not in own
+        ]
     least: dict[str, float | None] = {}
     for form, found in gaps.items():
         known = [gap for gap in found if gap is not None]
         least[form] = min(known) if known and len(known) == len(found) else None
     observed = None if arc is None else run_report(scenario, arc).min_gap
     values = []
-    for quantity, forms in (*_JSON_FORMS.items(), ("transient", ("printed", "valid", "improved", "floquet"))):
+    for quantity, forms in FORMS.items():
         for form in forms:
             value = {"observed": observed, **least}.get(form) if quantity == "min_gap" else None
             unit = {"rate": "1/s", "radius": "unit of x", "min_gap": "s", "transient": "1"}[quantity]
@@ -145,6 +161,12 @@ def _in_parts(
     notes += [f"Hypothesis '{h.name}' fails: {h.detail}" for h in hypotheses[1:] if not h.holds]
     empty: dict[str, float | None] = {"mu1": 0.0, "mu2": None, "T": cycle}
     return Certificates(scenario, tuple(values), tuple(hypotheses), empty, tuple(notes))
+
+
+def _positive_edges(scenario: Scenario, cycle: float) -> list[tuple[int, int]]:
+    """Edges that carry some weight, however little."""
+    doses = scenario.edge_weights.integral(0.0, cycle)
+    return [edge for edge, dose in zip(scenario.network.edges, doses, strict=True) if dose > 0]
 
 
 def _text(value: float | None, unit: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from hybrid_model.consensus.analysis import Analysis
-from hybrid_model.consensus.bounds import Bounds, with_threshold
+from hybrid_model.consensus.bounds import Bounds, is_lost, with_threshold
 from hybrid_model.consensus.corollary import corollary_rate, corollary_rate_exact
 from hybrid_model.consensus.hypotheses import PAPER_LAWS, Hypothesis
 from hybrid_model.consensus.joint_excitation import joint_excitation
@@ -24,6 +24,7 @@ def scenario_notes(bounds: Bounds, hypotheses: Sequence[Hypothesis], seen: Obser
         if not hypothesis.holds:
             yield f"Hypothesis '{hypothesis.name}' fails: {hypothesis.detail} {_remains(hypothesis, bounds)}".strip()
     yield from _constants(bounds.analysis)
+    yield from _accuracy(bounds)
     yield from _corollary(bounds.analysis)
     yield from _radius_notes(bounds)
     yield from _refuted(bounds, seen)
@@ -83,9 +84,29 @@ def _constants(analysis: Analysis) -> Iterator[str]:
         f"sup int ||M|| = {m.mu2_bar:.7g}; N mu1 = {n.mu1:.7g}, mu2 = {n.mu2:.7g}, sup int ||N|| = {n.mu2_bar:.7g}, "
         f"||int N||_F = {n.frobenius:.7g}."
     )
-    if analysis.spectrum is not None:
+    if analysis.spectrum is not None and not is_lost(analysis):
         multipliers = ", ".join(f"{abs(value):.6g}" for value in analysis.spectrum.multipliers)
         yield f"Moduli of the Floquet multipliers over {analysis.spectrum.period:.6g} s: {multipliers}."
+
+
+def _accuracy(bounds: Bounds) -> Iterator[str]:
+    """How near the exact numbers are to what they stand for."""
+    analysis = bounds.analysis
+    if is_lost(analysis) and analysis.spectrum is not None:
+        yield (
+            f"Over the long cycle of {analysis.spectrum.period:.6g} s all Floquet multipliers are below 1e-9; the "
+            "rate is that of a product which is scaled on the way."
+        )
+    worst = bounds.exact_worst
+    if worst is None or not bounds.slowest:
+        return
+    fewer = ""
+    if worst.resolution > analysis.resolution * (1 + 1e-12):
+        fewer = f", in place of {analysis.resolution:.6g}: the cycle of {analysis.cycle:.6g} s would take too many"
+    yield (
+        f"The exact radius is reached from below: on cells of k ||int N|| <= {worst.resolution:.6g}{fewer}. It lacks a "
+        f"share of the order of {worst.resolution**2:.1g}; the improved gap allows for {worst.cover - 1:.1g}."
+    )
 
 
 def _corollary(analysis: Analysis) -> Iterator[str]:

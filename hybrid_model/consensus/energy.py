@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid_model.consensus.analysis import Analysis
-from hybrid_model.consensus.excitation import Signal, scenario_excitation
+from hybrid_model.consensus.excitation import Signal, scenario_excitation, signal_factor
 from hybrid_model.consensus.graphs import disagreement_basis, incidence
 
 __all__ = ["energy_radius", "improved_contraction", "initial_peaks"]
@@ -81,30 +81,42 @@ def initial_peaks(analysis: Analysis, decay: float) -> tuple[float, NDArray[np.f
 
     Notes
     -----
-    The suprema are over the ends of short cells; what lies between is covered by a bound on the curvature: over a cell
-    with ``k int ||N|| <= d`` a component leaves the larger of its end values by at most ``d^2/8 ||xi||``.
+    The suprema are over the ends of short cells, and what may lie between is added. Over a cell with
+    ``k int ||N|| <= d`` the state leaves one of its end values by at most ``d/2 ||xi||``; if all weights have one
+    shape, it leaves the straight line between them by at most ``d^2/8 ||xi||``.
     """
     network, cells = analysis.scenario.network, analysis.cells
     basis = disagreement_basis(network.agents)
     edges = basis.T @ np.hstack([incidence(network.agents, e) for e in (network.edges, network.underlying_edges)])
     listed = len(network.edges)
     lengths = np.where(cells.is_idle, 0.0, np.diff(cells.times))
-    finest = max(float(np.max(cells.doses.sum(axis=1))) * 2 * network.gain, 0.02)
-    bulge = (1 + min(finest, 1.0) ** 2) * math.exp(decay * float(np.max(lengths)))
+    aside = _between_ends(analysis)
+    longer = math.exp(decay * float(np.max(lengths)))
     path, state = np.empty((len(cells.flows) + 1, basis.shape[1])), analysis.initial_disagreement
     pairs, norm, start, least = np.zeros(listed), 0.0, 0.0, _FORGOTTEN * float(np.linalg.norm(state))
     for _ in range(_MOST_CYCLES):
         path[0] = state
         for j, flow in enumerate(cells.flows):
             path[j + 1] = flow @ path[j]
-        growth = np.exp(decay * (start + cells.times))[:, None]
-        values = np.abs(path @ edges)
-        slack = (bulge - 1) * math.sqrt(2.0) * np.linalg.norm(path, axis=1)[:, None]
-        pairs = np.maximum(pairs, np.max((values[:, :listed] + slack) * growth, axis=0))
+        growth = np.exp(decay * (start + cells.times))
+        # A cell adds to both its ends what it may hold above them.
+        inside = (longer * (1 + aside) - 1) * np.linalg.norm(path[:-1], axis=1) * growth[:-1]
+        sizes = np.maximum(np.append(inside, 0.0), np.append(0.0, inside))
+        values = np.abs(path @ edges) * growth[:, None]
+        pairs = np.maximum(pairs, np.max(values[:, :listed] + math.sqrt(2.0) * sizes[:, None], axis=0))
         norms = np.linalg.norm(values[:, listed:], axis=1)
-        norm = max(norm, float(np.max(norms * growth[:, 0])) * bulge)
+        norm = max(norm, float(np.max(norms + analysis.edge_gain * sizes)))
         state, start = path[-1], start + float(cells.times[-1])
         rest = float(np.linalg.norm(state)) * math.exp(decay * (start + float(cells.times[-1])))
         if rest <= least or not analysis.is_periodic:
             break
-    return norm, np.maximum(pairs, math.sqrt(2.0) * rest)
+    return max(norm, analysis.edge_gain * rest), np.maximum(pairs, math.sqrt(2.0) * rest)
+
+
+def _between_ends(analysis: Analysis) -> NDArray[np.float64]:
+    """How far the state leaves its values at the ends of each cell, per ``||xi||`` at its beginning."""
+    factor, cells = signal_factor(analysis.scenario, Signal.DISAGREEMENT), analysis.cells
+    matrices = (factor * cells.doses[:, None, :]) @ factor.T
+    doses = analysis.scenario.network.gain * np.linalg.eigvalsh(matrices)[:, -1]
+    alike = len(set(analysis.scenario.edge_weights.carriers)) == 1
+    return np.asarray(np.minimum(doses**2 / 8 if alike else doses / 2, 1.0))

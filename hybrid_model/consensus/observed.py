@@ -12,6 +12,8 @@ from hybrid_model.consensus.analysis import Analysis
 from hybrid_model.consensus.graphs import disagreement_basis
 from hybrid_model.consensus.network import agent_name
 from hybrid_model.consensus.report import edge_norm, run_report
+from hybrid_model.consensus.scenario_data import Scenario
+from hybrid_model.consensus.trigger_data import TriggerKind
 
 __all__ = ["TIME_TOLERANCE", "Observation", "observe"]
 
@@ -26,8 +28,9 @@ class Observation:
     Attributes
     ----------
     min_gap : float or None
-        Shortest time [s] between two broadcasts of one agent, less the numerical tolerance of two event times; None if
-        no agent broadcast twice.
+        Shortest time [s] between two broadcasts of one agent; None if no agent broadcast twice. It is less the
+        numerical tolerance of two event times, but for sampled checks: those are at known times, so there it is the
+        whole number of periods that it stands for.
     radius : float or None
         Largest ``exp(beta t) (||x_e(t)|| - ||x_e(t) without errors||)`` over the last cycle: what is left once the
         share of the initial state is taken off. Never above the exact worst case. None without a network that reaches
@@ -56,7 +59,7 @@ def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observat
     scenario = analysis.scenario
     gap = run_report(scenario, arc).min_gap
     times, free = undisturbed(analysis, float(arc.t[-1]))
-    shortest = None if gap is None else gap - 2 * TIME_TOLERANCE
+    shortest = None if gap is None else _shortest(scenario, gap)
     if decay is None:
         return Observation(min_gap=shortest, radius=None, initial_share=None)
     names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
@@ -68,6 +71,12 @@ def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observat
         radius=max(0.0, float(np.max(edge_norm(scenario, states) * growth - share))),
         initial_share=float(np.max(share)),
     )
+
+
+def _shortest(scenario: Scenario, gap: float) -> float:
+    if scenario.trigger.kind is TriggerKind.SAMPLED and scenario.channel.ideal:
+        return round(gap / scenario.trigger.period) * scenario.trigger.period
+    return gap - 2 * TIME_TOLERANCE
 
 
 def undisturbed(analysis: Analysis, end: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

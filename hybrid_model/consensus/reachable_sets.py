@@ -65,6 +65,8 @@ class ReachableSets:
     ----------
     resolution : float
         The one in use.
+    is_coarser : bool
+        Whether that is coarser than what was asked for.
     """
 
     def __init__(
@@ -80,6 +82,7 @@ class ReachableSets:
         """Cut one period into cells."""
         self._periodic = periodic
         self.resolution = affordable_resolution(scenario, 0.0, period, resolution, most)
+        self.is_coarser = self.resolution > resolution
         longest = self.resolution / decay if decay > 0 else np.inf
         # Cells that follow each wave serve accuracy: they are kept as long as there are not too many.
         waving = 64 * period * max(carrier.rate for carrier in scenario.edge_weights.carriers) / np.pi
@@ -228,8 +231,10 @@ class ReachableSets:
         return np.unique(np.concatenate(found)).astype(np.intp)
 
     def contraction(self) -> float:
-        """Largest ``||phi(t + P, t)||`` over the grid of times."""
-        return self._cells.contraction()
+        """Largest ``||phi(t + P, t)||`` over the grid of times; a bound on it for all times if the grid is coarser."""
+        # Within a cell the norm rises above its values at the ends by a share of the second order.
+        cover = 1 + self.resolution**2 if self.is_coarser else 1.0
+        return min(1.0, cover * self._cells.contraction())
 
     def overshoot(self, rate: float) -> float:
         """Largest ``||phi(t, s)|| exp(rate (t - s))``, see `FlowCells.overshoot`."""
