@@ -4,23 +4,56 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import inspect
+import os
+import re
+import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from cosim.cli.exits import Exit, UsageError, progress, start_values
+from fmu.build import check_target
+from fmu.errors import ExportError
 from fmu.export import Fmi, export_fmu
+from fmu.platforms import PLATFORMS
 from hybrid_model import Automaton
 from hybrid_model.consensus.network import scenario_agents
 from hybrid_model.consensus.scenario import load_scenario
 
+KINDS = ("cs", "me")
+ALL = "all"
+
 
 def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
-    parser = commands.add_parser("export", help="export an automaton or a scenario's agents", allow_abbrev=False)
+    parser = commands.add_parser(
+        "export",
+        help="export an automaton or a scenario's agents as FMUs",
+        description="Write an automaton, or each agent of a scenario, as a native FMU. Prints the files written.",
+        allow_abbrev=False,
+    )
     parser.add_argument("target", metavar="TARGET", help="module:ClassName, name of a preset, or path of a TOML file")
-    parser.add_argument("--fmi", choices=[version.value for version in Fmi], default=Fmi.V3_0.value)
-    parser.add_argument("--kind", choices=("cs",), action="append", help="kind of FMU: cs, co-simulation")
+    parser.add_argument(
+        "--fmi", choices=[version.value for version in Fmi], default=Fmi.V3_0.value, help="version of the standard"
+    )
+    parser.add_argument(
+        "--kind",
+        choices=KINDS,
+        action="append",
+        help="cs: co-simulation, me: model exchange; repeatable; default: both",
+    )
+    parser.add_argument(
+        "--platform",
+        choices=[*PLATFORMS, ALL],
+        action="append",
+        help="where the FMU shall run; repeatable; others than this machine's, the default, need the package ziglang",
+    )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the FMUs")
+    parser.add_argument("--stop-time", type=float, help="stop time in s that the FMU proposes; default: a scenario's")
+    parser.add_argument("--step-size", type=float, help="communication step in s that the FMU proposes")
     parser.add_argument(
         "--start-value",
         action="append",
@@ -33,26 +66,99 @@ def add_parser(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    stop_time, automata = _automata(options.target, start_values(options.start_value))
-    options.out.mkdir(parents=True, exist_ok=True)
-    for name, automaton in automata.items():
-        progress(f"exporting {name}")
-        print(export_fmu(automaton, options.out / f"{name}.fmu", fmi=options.fmi, stop_time=stop_time))
+    with _imports_from_here():
+        stop_time, automata = _automata(options.target, start_values(options.start_value))
+        files = {name: options.out / f"{_file_name(name)}.fmu" for name in automata}
+        for file in files.values():
+            check_target(file)
+        settings = {
+            "fmi": options.fmi,
+            "kinds": tuple(kind for kind in KINDS if kind in (options.kind or KINDS)),
+            "platforms": _platforms(options.platform),
+            "stop_time": stop_time if options.stop_time is None else options.stop_time,
+            "step_size": options.step_size,
+            "progress": progress,
+        }
+        known = inspect.signature(export_fmu).parameters
+        for count, (name, automaton) in enumerate(automata.items(), 1):
+            progress(f"exporting {name} ({count} of {len(automata)})")
+            given = {option: value for option, value in settings.items() if option in known}
+            print(export_fmu(automaton, files[name], **given))
     return Exit.DONE
+
+
+def _platforms(names: list[str] | None) -> tuple[str, ...] | None:
+    if names is None:
+        return None
+    return tuple(PLATFORMS) if ALL in names else tuple(name for name in PLATFORMS if name in names)
+
+
+def _file_name(name: str) -> str:
+    # The name of an automaton is free; that of a file must stay in the folder.
+    return re.sub(r"[^\w.+-]", "_", name).lstrip(".") or "_"
 
 
 def _automata(target: str, starts: dict[str, float]) -> tuple[float | None, dict[str, Automaton]]:
     module, colon, name = target.partition(":")
-    if not colon:
+    if not colon or Path(target).suffix == ".toml":
         if starts:
             raise UsageError("--start-value goes with module:ClassName; a scenario has its values in its file.")
         scenario = load_scenario(target)
         return scenario.stop_time, dict(scenario_agents(scenario))
-    try:
-        found = getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError) as error:
-        raise UsageError(f"{target} cannot be found: {error}. Give module:ClassName.") from error
+    found = _found(module, name, target)
+    if isinstance(found, Automaton):
+        if starts:
+            raise UsageError(f"--start-value goes with a class, and {target} is an instance, which has its values.")
+        return None, {found.name: found}
     if not (isinstance(found, type) and issubclass(found, Automaton)):
         raise UsageError(f"{target} is not an automaton class: derive it from hybrid_model.HybridAutomaton.")
-    automaton = found(**starts)
+    try:
+        automaton = found(**starts)
+    except TypeError as error:
+        raise UsageError(f"{target} cannot be made with the start values given: {error}.") from error
     return None, {automaton.name: automaton}
+
+
+def _found(module: str, name: str, target: str) -> object:
+    try:
+        return getattr(importlib.import_module(module), name)
+    except (AttributeError, ModuleNotFoundError, ValueError, TypeError) as error:
+        # A module that is there may fail with the same errors.
+        if not _is_about_the_target(error, module, name):
+            raise _failed(module, error) from error
+        raise UsageError(f"{target} cannot be found: {error}. Give module:ClassName.") from error
+    except (Exception, SystemExit) as error:
+        raise _failed(module, error) from error
+
+
+def _is_about_the_target(error: Exception, module: str, name: str) -> bool:
+    if isinstance(error, ModuleNotFoundError):
+        return f"{module}.".startswith(f"{error.name}.")
+    if isinstance(error, AttributeError):
+        return module in sys.modules and error.obj is sys.modules[module] and error.name == name
+    return not module or module.startswith(".")
+
+
+def _failed(module: str, error: BaseException) -> ExportError:
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [
+        frame for frame in frames if frame.filename not in (__file__, importlib.__file__) and "<" not in frame.filename
+    ]
+    place = f" ({own[0].filename}, line {own[0].lineno})" if own else ""
+    return ExportError(
+        f"The module '{module}' cannot be imported, because it fails with {type(error).__name__}: {error}{place}. "
+        f"Remedy: correct it; 'python -c \"import {module}\"' shows more."
+    )
+
+
+@contextmanager
+def _imports_from_here() -> Iterator[None]:
+    """Find modules in the current folder too, as ``python -m`` does."""
+    here = os.getcwd()
+    sys.path.insert(0, here)
+    importlib.invalidate_caches()
+    try:
+        yield
+    finally:
+        if here in sys.path:
+            sys.path.remove(here)
