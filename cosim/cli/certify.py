@@ -15,6 +15,9 @@ from hybrid_model.consensus.certify import Certificates, certify
 from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.scenario import load_scenario
 
+SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-audit.md of this project"
+"""What the short names in the sources of values mean."""
+
 _TITLES = {
     "rate": "rate of convergence",
     "transient": "factor of the rate",
@@ -51,6 +54,7 @@ def _document(found: Certificates, *, details: bool) -> dict[str, Any]:
     document = found.as_dict()
     if details:
         document["details"] = [asdict(value) for value in found.values]
+        document["sources"] = SOURCES
         document["hypotheses"] = [asdict(hypothesis) for hypothesis in found.hypotheses]
     return document
 
@@ -65,7 +69,8 @@ def _text(found: Certificates) -> str:
     lines += ["", f"excitation of the tree's weights: mu1 {_number(mu1)}, mu2 {_number(mu2)}, T {_number(window)} s"]
     lines += ["", "hypotheses"]
     lines += [f"  {'holds' if h.holds else 'FAILS':<6} {h.name}: {h.detail} ({h.source})" for h in found.hypotheses]
-    return "\n".join([*lines, "", "notes", *(f"  - {note}" for note in found.notes)])
+    lines += ["", "notes", *(f"  - {note}" for note in found.notes)]
+    return "\n".join([*lines, "", f"sources: {SOURCES}"])
 
 
 def _row(value: Certified, found: Certificates) -> str:

@@ -1,8 +1,8 @@
 """Event-triggered consensus under time-varying, persistently exciting weights and switching topologies.
 
 Source: S. Arun Kumar, N. R. Chowdhury, S. Srikant, J. Raisch, "Consensus analysis of systems with time-varying
-interactions: an event-triggered approach" ("the paper" in this package), and an audit of its formulas ("audit") that
-says which of them hold as printed.
+interactions: an event-triggered approach" ("the paper" in this package). What holds of its formulas, and what holds
+instead, is in docs/paper-audit.md; "audit" with the number of a section means that page.
 """
 
 from hybrid_model.consensus.agents import (

@@ -28,7 +28,7 @@ class LossyChannel(hm.HybridAutomaton):
     """The links from an agent's neighbours: each broadcast arrives after a delay, or is lost.
 
     The receiver keeps the value that arrived last, so that agents hold different copies of one broadcast value and the
-    average of the states is no longer conserved (audit, section 11). The broadcast at the start is known to all.
+    average of the states is no longer conserved (audit, section 11.8). The broadcast at the start is known to all.
 
     A broadcast is noticed by the sender's count. Whether it is lost is decided by a number of the minimal standard
     generator, one sequence a link: products of two whole numbers below 2**31 and 2**16, exact in floating point, so

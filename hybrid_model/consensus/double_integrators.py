@@ -1,7 +1,7 @@
 """Double integrators that broadcast position and velocity, and extrapolate what they have heard.
 
 G. S. Seyboth, D. V. Dimarogonas, K. H. Johansson, "Event-based broadcasting for multi-agent average consensus",
-Automatica 49 (2013) 245-252, section on double-integrator agents; audit, section 11. Between two broadcasts everybody
+Automatica 49 (2013) 245-252, section on double-integrator agents; audit, section 11.2. Between two broadcasts everybody
 takes agent i to move on evenly,
 
     xhat_i(t) = x_i(t_k) + (t - t_k) v_i(t_k),      vhat_i(t) = v_i(t_k),

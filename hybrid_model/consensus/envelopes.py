@@ -36,7 +36,7 @@ def envelope(scenario: Scenario) -> Envelope | None:
 def sampled_threshold(
     scenario: Scenario, radius: float, transient: float, degrees: list[int], largest_weight: float
 ) -> float | None:
-    """The c' with ``|e_i(t)| <= c' exp(-beta t)`` if the trigger looks only every h seconds (audit, section 11, 7).
+    """The c' with ``|e_i(t)| <= c' exp(-beta t)`` if the trigger looks only every h seconds (audit, section 11.7).
 
     Within h the state moves by at most ``h k omega (sqrt(d_i) R(c') + 2 c' d_i)`` with ``R(c') = radius c' +
     transient``. The largest error is the fixed point ``c' = e^{beta h} (c + that)``.

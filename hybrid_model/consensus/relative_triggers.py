@@ -2,8 +2,8 @@
 
 With ``V = |x - mean(x)|**2/2``, ``e = xhat - x``, ``l_ii = sum_j w_ij`` and
 ``q_i = 1/2 sum_j w_ij (xhat_j - xhat_i)**2`` the consensus protocol gives, for undirected weights that may vary in
-time, ``V' <= -k sum_i (q_i/2 - l_ii e_i**2)`` (audit, section 11). Both laws keep ``l_ii e_i**2`` below a share of
-``q_i/2``. They hear the neighbours' broadcasts and know the weights of their own edges at the present time; nothing is
+time, ``V' <= -k sum_i (q_i/2 - l_ii e_i**2)`` (audit, section 11.4). Both laws keep ``l_ii e_i**2`` below a share
+of ``q_i/2``. They hear the neighbours' broadcasts and know the weights of their own edges at the present time; nothing is
 measured at the neighbours between events.
 
 An agent may fire at the very instant of a neighbour's broadcast, which lowers its ``q_i``. It fires at most once at an
@@ -44,7 +44,7 @@ class RelativeTrigger(NeighbourhoodTrigger):
     """Broadcasts when ``l_ii e_i**2 >= sigma q_i/2 + floor exp(-decay t)``.
 
     The law is ``e_i**2 > sigma/(2 l_ii) q_i`` of X. Yi, K. Liu, D. V. Dimarogonas, K. H. Johansson (arXiv:1704.05434),
-    which carries over to time-varying weights verbatim (audit, section 11). Multiplied by ``l_ii`` it is defined while
+    which carries over to time-varying weights verbatim (audit, section 11.4). Multiplied by ``l_ii`` it is defined while
     no edge carries weight. At consensus, and while no edge carries weight, it reads ``0 > 0``; the positive floor keeps
     the closed jump set, which contains the equality, away from there: ``0 >= floor`` is false.
 
@@ -69,7 +69,7 @@ class GirardTrigger(NeighbourhoodTrigger):
     ``eta' = -leak eta + k (sigma q_i/2 - l_ii e_i**2)``, a broadcast when ``theta (l_ii e_i**2 - sigma q_i/2) >= eta``.
 
     A. Girard, "Dynamic triggering mechanisms for event-triggered control", IEEE Trans. Automatic Control 60 (2015)
-    (arXiv:1301.2182), in the form for persistently exciting weights (audit, section 11): ``U = V + sum eta_i`` obeys
+    (arXiv:1301.2182), in the form for persistently exciting weights (audit, section 11.5): ``U = V + sum eta_i`` obeys
     ``U' <= -k (1 - sigma)/2 sum q_i - leak sum eta_i``, so that consensus is exponential if the weights are
     persistently exciting. Between events ``eta' >= -(leak + k/theta) eta``, so eta stays positive and ``0 >= eta`` is
     false at consensus.

@@ -7,7 +7,7 @@ With known weights the error between two messages is known too,
 so the agent needs no measurement until it broadcasts: it computes the time at which ``|e| = c exp(-beta t)`` and sets
 an alarm. It computes anew with each message of a neighbour and where a weight has a breakpoint. The broadcasts are
 those of the dynamic trigger (D. V. Dimarogonas, E. Frazzoli, K. H. Johansson, IEEE Trans. Automatic Control 57 (2012)
-1291-1297, section on self-triggered control; audit, section 11).
+1291-1297, section on self-triggered control; audit, section 11.6).
 """
 
 from __future__ import annotations

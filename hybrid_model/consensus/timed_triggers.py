@@ -17,7 +17,7 @@ class SampledTrigger(EventGenerator):
     At the times ``m period`` the state is sampled; if ``|xhat - x| >= c exp(-beta t)`` there, the sample is broadcast
     at that instant. X. Meng, T. Chen, "Event based agreement protocols for multi-agent networks", Automatica 49 (2013)
     2125-2132. Between two checks the error may pass the threshold, so c in the bounds becomes the c' of the fixed point
-    in audit, section 11.
+    in audit, section 11.7.
 
     Between checks the margin is a constant, made of the sample and of the threshold at its time.
     """

@@ -74,7 +74,7 @@ class MixedTrigger(DynamicTrigger):
 
     G. S. Seyboth, D. V. Dimarogonas, K. H. Johansson, "Event-based broadcasting for multi-agent average consensus",
     Automatica 49 (2013) 245-252. The radius is that of the static trigger with c0; by linearity the rest adds a
-    transient that decays as with the dynamic trigger (audit, section 11).
+    transient that decays as with the dynamic trigger (audit, section 11.1).
     """
 
     offset = hm.Parameter(0.1, description="threshold c0 that stays")

@@ -24,7 +24,8 @@ from hybrid_model.consensus.scenario import load_scenario
 from hybrid_model.consensus.spanning_trees import TreePartition
 from hybrid_model.consensus.weights import WeightMap
 
-PAGE = Path(__file__).parents[2] / "docs" / "paper-audit.md"
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "paper-audit.md"
 STAR, PATH = ((1, 2), (1, 3), (1, 4)), ((1, 2), (2, 3), (3, 4))
 
 
@@ -73,6 +74,10 @@ def numbers(example):
         "largest multiplier with w = g": largest_signed_multiplier(),
         "mu1 of W_tau with w = g^2": analysis.tree_weights.mu1,
         "mu2 of W_tau with w = g^2": analysis.tree_weights.mu2,
+        "integral of g_1^2 over pi s, per time of one opening": float(
+            (wave := analysis.scenario.weights.waveforms[0]).integral(0.0, math.pi)
+        )
+        / (math.pi / 2 * wave.duty_percent / 100),
         "alpha_v printed, example": printed.rate,
         "alpha_v valid, example": valid.rate,
         "rate improved, example": static.improved_rate,
@@ -112,6 +117,8 @@ def numbers(example):
         "largest certifiable alpha_v, star": counterexamples.certifiable_rate(4, STAR, 0.4 * math.pi),
         "largest certifiable alpha_v, path": counterexamples.certifiable_rate(4, PATH, 0.4 * math.pi),
         "mean of the states at 50 s, example": float(dynamic_run.x_end.mean()),
+        "events, example, beta = 0": sum(static_run.events_per_agent),
+        "events, example, beta = 0.06": sum(dynamic_run.events_per_agent),
     }
 
 
@@ -205,3 +212,42 @@ def test_the_page_explains_every_row(verdicts):
     headings = " ".join(line for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith("## "))
     explained = set(re.findall(r"[(, ]([0a-m][a-h0-9]?'{0,2})(?=[,)])", headings))
     assert set(verdicts) <= explained
+
+
+REFERENCE = re.compile(r"audit,?\s+(?:#\s*)?(?:end\s+of\s+)?sections?\s+((?:\d[\d.]*(?:, (?=\d)| and | to )?)+)")
+
+
+def sections():
+    """Numbers of the page's sections."""
+    return set(re.findall(r"^#{2,3} (\d+(?:\.\d+)?)\.? ", PAGE.read_text(encoding="utf-8"), re.MULTILINE))
+
+
+def references(text):
+    """Numbers of the sections that a text refers to."""
+    return [number for match in REFERENCE.findall(text) for number in re.findall(r"\d+(?:\.\d+)*", match)]
+
+
+def test_references_are_found_however_they_are_written():
+    text = "(audit, section 5.2) audit section 1. audit, sections 3 to 5) (audit, end of section 5.2; audit,\n    section 11"
+    assert references(text) == ["5.2", "1", "3", "5", "5.2", "11"]
+
+
+def test_every_section_that_the_package_refers_to_is_on_the_page():
+    files = [path for folder in ("hybrid_model", "cosim", "fmu", "docs") for path in (ROOT / folder).rglob("*.*")]
+    texts = {path: path.read_text(encoding="utf-8") for path in files if path.suffix in {".py", ".md", ".toml"}}
+    found = {path: references(text) for path, text in texts.items()}
+    assert sum(map(len, found.values())) > 50
+    known = sections()
+    missing = {str(path.relative_to(ROOT)): set(numbers) - known for path, numbers in found.items()}
+    assert not {path: numbers for path, numbers in missing.items() if numbers}
+    # No other page of that name, and no reference that the pattern above does not see.
+    for path, text in texts.items():
+        assert not re.search(r"(?<!paper-)audit\.md", text), path
+        for match in re.finditer(r"\baudit\b", text):
+            near = text[match.start() : match.start() + 60]
+            assert REFERENCE.match(near) or is_the_page(text, match.start(), near), (path, near)
+
+
+def is_the_page(text, place, near):
+    """Whether the word belongs to the page's own name, or to the sentences that say what "audit" means."""
+    return text[:place].endswith("paper-") or near.startswith(("audit" + chr(34), "audit, section N", "audit = docs/"))
