@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from cosim.cli import certify, cosimulate, export, paper, simulate
+from cosim.cli import certify, cosimulate, export, paper, simulate, validate
 from cosim.cli.exits import Exit, UsageError
 from cosim.errors import CosimError
 from fmu.build import BuildError
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in (paper, simulate, certify, export, cosimulate):
+    for command in (paper, simulate, certify, export, cosimulate, validate):
         command.add_parser(commands)
     options = parser.parse_args(arguments)
     try:

@@ -1,0 +1,311 @@
+"""The archive of an FMU: looked at before anything is written, then extracted.
+
+This module needs only the standard library and nothing of the exporter, so that importers may use it too.
+"""
+
+from __future__ import annotations
+
+import itertools
+import stat
+import struct
+import unicodedata
+import zipfile
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+BROKEN = (
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+    NotImplementedError,
+    EOFError,
+    OSError,
+    OverflowError,
+    RuntimeError,
+    ValueError,
+    IndexError,
+)
+"""What `zipfile` raises on damaged archives."""
+
+ENCRYPTED, STORED, DEFLATED = 0x1, 0, 8
+DESCRIPTION = "modelDescription.xml"
+_CHUNK = 1 << 20
+_LOCAL_HEADER = 30
+_RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
+
+
+class ArchiveError(ValueError):
+    """An archive must not be extracted; the message says why.
+
+    Attributes
+    ----------
+    problems : tuple of tuple of str
+        Rule and sentence of each problem.
+    """
+
+    def __init__(self, problems: tuple[tuple[str, str], ...]) -> None:
+        super().__init__(" ".join(sentence for _, sentence in problems[:5]))
+        self.problems = problems
+
+
+@dataclass(frozen=True)
+class ArchiveLimits:
+    """What an archive may hold.
+
+    Attributes
+    ----------
+    entries : int
+        Members.
+    total_bytes : int
+        All members unpacked, in bytes.
+    ratio : float
+        Unpacked to packed size of one member; asked of members larger than `ratio_from` bytes, for text of zeros and
+        blanks packs well.
+    ratio_from : int
+    name_length : int
+        Characters of a member's name.
+    """
+
+    entries: int = 20_000
+    total_bytes: int = 2 << 30
+    ratio: float = 200.0
+    ratio_from: int = 16 << 20
+    name_length: int = 1024
+
+
+LIMITS = ArchiveLimits()
+
+
+class Archive:
+    """An archive that has been found safe to extract.
+
+    Parameters
+    ----------
+    path : str or Path
+        The FMU.
+    limits : ArchiveLimits
+
+    Raises
+    ------
+    ArchiveError
+        If the file is no archive, or holds a name, a link, a size or a coding that an FMU must not have.
+    OSError
+        If the file cannot be read.
+    """
+
+    def __init__(self, path: str | Path, limits: ArchiveLimits = LIMITS) -> None:
+        self._file: IO[bytes] = Path(path).open("rb")  # noqa: SIM115 - `__exit__` closes it
+        try:
+            self._zip = _opened(self._file)
+            problems = tuple(problems_of(self._zip, limits))
+            if problems:
+                raise ArchiveError(problems)
+        except BaseException:
+            self._file.close()
+            raise
+        self.prefixed = bool(self._zip.infolist()) and min(m.header_offset for m in self._zip.infolist()) > 0
+        self._members = {member.filename: member for member in self._zip.infolist() if not member.is_dir()}
+
+    def __enter__(self) -> Archive:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._zip.close()
+        self._file.close()
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the files, in the archive's order."""
+        return list(self._members)
+
+    def size(self, name: str) -> int:
+        """Return the unpacked size of a file in bytes."""
+        return self._members[name].file_size
+
+    def read(self, name: str) -> bytes:
+        """Return what a file holds.
+
+        Raises
+        ------
+        ArchiveError
+            If its bytes are damaged.
+        """
+        return b"".join(self._chunks(name))
+
+    def extract(self, folder: Path) -> Path:
+        """Write all files below an existing folder, and return it.
+
+        Raises
+        ------
+        ArchiveError
+            If the bytes of a file are damaged.
+        """
+        for name in self._members:
+            target = folder.joinpath(*name.split("/"))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            with target.open("xb") as file:
+                for chunk in self._chunks(name):
+                    file.write(chunk)
+        return folder
+
+    def _chunks(self, name: str) -> Iterator[bytes]:
+        try:
+            with self._zip.open(self._members[name]) as member:
+                # zipfile stops at the announced size, which has been held against the limits, and checks the sum.
+                while chunk := member.read(_CHUNK):
+                    yield chunk
+        except BROKEN as error:
+            raise ArchiveError(
+                (("damaged", f"The member {name!r} is damaged: {error}. Pack the FMU anew."),)
+            ) from error
+
+
+def extract_fmu(path: str | Path, folder: str | Path, limits: ArchiveLimits = LIMITS) -> Path:
+    """Extract an FMU into an existing folder; an unsafe archive is refused before anything is written.
+
+    Parameters
+    ----------
+    path : str or Path
+        The FMU.
+    folder : str or Path
+        Existing folder, best an empty one: no file is overwritten.
+    limits : ArchiveLimits
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    ArchiveError
+        If the archive is unsafe or damaged.
+    OSError
+        If a file cannot be read or written.
+    """
+    with Archive(path, limits) as archive:
+        return archive.extract(Path(folder))
+
+
+def _opened(file: IO[bytes]) -> zipfile.ZipFile:
+    try:
+        return zipfile.ZipFile(file)
+    except BROKEN as error:
+        raise ArchiveError(
+            (("zip", f"The file is not a readable ZIP archive: {error}. Pack the FMU anew."),)
+        ) from error
+
+
+def problems_of(archive: zipfile.ZipFile, limits: ArchiveLimits) -> Iterator[tuple[str, str]]:
+    """Yield the rule and the sentence of each reason not to extract an archive."""
+    members = archive.infolist()
+    if len(members) > limits.entries:
+        yield "entries", f"The archive has {len(members)} members; at most {limits.entries} are accepted."
+        return
+    for member in members:
+        yield from _name_problems(member, limits)
+        yield from _member_problems(member, limits)
+    total = sum(member.file_size for member in members)
+    if total > limits.total_bytes:
+        yield "size", f"The archive unpacks to {total} bytes; at most {limits.total_bytes} are accepted."
+    yield from _clashes(members)
+    yield from _overlaps(members)
+    if DESCRIPTION not in archive.NameToInfo:
+        yield (
+            "description",
+            f"The archive has no {DESCRIPTION} at its top; every FMU has one: pack the folder's content.",
+        )
+
+
+def _name_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[tuple[str, str]]:
+    name = member.orig_filename  # `filename` is cut at a NUL and has the separators of this system
+    shown = repr(name[:120])
+    parts = name.removesuffix("/").split("/")
+    if "\\" in name:
+        yield "backslash", f"The member {shown} has a backslash; ZIP separates folders by '/'."
+    if name.startswith("/"):
+        yield "absolute", f"The member {shown} is an absolute path; an FMU stays within its folder."
+    elif "" in parts or "." in parts:
+        yield "path", f"The member {shown} has an empty or '.' part; give a plain relative path."
+    if ".." in parts:
+        yield "traversal", f"The member {shown} leaves the FMU's folder by '..'; give a plain relative path."
+    if ":" in name:
+        yield "drive", f"The member {shown} has a colon, which names a drive or stream on Windows; rename it."
+    if any(unicodedata.category(c) in ("Cc", "Cs") for c in name):
+        yield "control", f"The member {shown} has a control character in its name; rename it."
+    if len(name) > limits.name_length or any(len(part.encode("utf-8", "replace")) > 255 for part in parts):
+        yield "long", f"The member {shown} has a name of {len(name)} characters, which file systems refuse; shorten it."
+    if any(part.rstrip(". ") != part for part in parts if part not in ("", ".", "..")):
+        yield "trailing", f"The member {shown} ends in a dot or blank, which Windows drops; rename it."
+    if any(part.partition(".")[0].lower() in _RESERVED for part in parts):
+        yield "reserved", f"The member {shown} has the name of a Windows device; rename it."
+
+
+def _member_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[tuple[str, str]]:
+    shown = repr(member.orig_filename[:120])
+    kind = stat.S_IFMT(member.external_attr >> 16)
+    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
+        what = "a symbolic link" if kind == stat.S_IFLNK else "a special file"
+        yield "link", f"The member {shown} is {what}; an FMU holds plain files: put the file itself there."
+    if member.flag_bits & ENCRYPTED:
+        yield "encrypted", f"The member {shown} is encrypted, which FMI forbids; pack it in plain."
+    if member.compress_type not in (STORED, DEFLATED):
+        yield (
+            "compression",
+            f"The member {shown} has compression method {member.compress_type}; FMI allows 0 (store) and 8 (deflate).",
+        )
+    if member.is_dir() and member.file_size:
+        yield "folder", f"The folder {shown} holds {member.file_size} bytes; a folder holds none."
+    if member.file_size > limits.ratio_from and member.file_size > limits.ratio * max(member.compress_size, 1):
+        ratio = member.file_size / max(member.compress_size, 1)
+        yield (
+            "ratio",
+            f"The member {shown} unpacks {ratio:.0f}-fold to {member.file_size} bytes; "
+            f"at most {limits.ratio:g}-fold is accepted: it looks like a decompression bomb.",
+        )
+
+
+def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[tuple[str, str]]:
+    exact: set[str] = set()
+    folded: dict[str, str] = {}
+    files: set[str] = set()
+    folders: set[str] = set()
+    for member in members:
+        name = member.filename.removesuffix("/")
+        key = unicodedata.normalize("NFC", name).casefold()
+        if name in exact:
+            yield "duplicate", f"The member {name[:120]!r} is there twice, and readers differ in which one they take."
+        elif key in folded:
+            yield (
+                "case",
+                f"The members {folded[key][:120]!r} and {name[:120]!r} are one file on systems that ignore "
+                "case: rename one.",
+            )
+        exact.add(name)
+        folded.setdefault(key, name)
+        parts = key.split("/")
+        if len(parts) <= 64:
+            folders.update("/".join(parts[:depth]) for depth in range(1, len(parts)))
+        else:
+            yield "deep", f"The member {name[:120]!r} lies {len(parts)} folders deep; at most 64 are accepted."
+        if not member.is_dir():
+            files.add(key)
+    for key in sorted(files & folders):
+        yield "duplicate", f"The member {key[:120]!r} is a file and a folder at once."
+
+
+def _overlaps(members: list[zipfile.ZipInfo]) -> Iterator[tuple[str, str]]:
+    # Members that share bytes unpack to more than the limits on each one foresee.
+    ordered = sorted(members, key=lambda member: member.header_offset)
+    for first, second in itertools.pairwise(ordered):
+        if first.header_offset + _LOCAL_HEADER + first.compress_size > second.header_offset:
+            yield (
+                "overlap",
+                f"The members {first.orig_filename[:120]!r} and {second.orig_filename[:120]!r} share bytes of "
+                "the archive: "
+                "it looks like a decompression bomb.",
+            )
+            return

@@ -1,0 +1,127 @@
+"""The C functions of an FMU, called one by one with a record of where the process is."""
+
+from __future__ import annotations
+
+import ctypes as c
+import json
+import mmap
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+PLACE_BYTES = 512
+
+
+class Stopped(Exception):
+    """The experiment cannot go on."""
+
+
+class Variable(NamedTuple):
+    """A variable as the plan has it."""
+
+    name: str
+    reference: int
+    type: str
+    size: int
+    causality: str
+    start: list[str] | None
+    readable: bool
+
+
+class Update(NamedTuple):
+    """What the update of discrete states says."""
+
+    again: bool
+    terminate: bool
+    next_time: float | None
+
+
+class Step(NamedTuple):
+    """What a step says; `status` is OK, WARNING or DISCARD."""
+
+    status: int
+    event: bool
+    terminate: bool
+    early: bool
+    time: float
+
+
+class Recorder:
+    """Where the process is, and what was found; both in files, which outlive a crash."""
+
+    def __init__(self, place: str, findings: str) -> None:
+        with Path(place).open("r+b") as file:
+            self._place = mmap.mmap(file.fileno(), PLACE_BYTES)
+        self._findings = Path(findings).open("a", encoding="utf-8", buffering=1)  # noqa: SIM115 - for life
+
+    def at(self, text: str) -> None:
+        """Note what is about to be called."""
+        self._place[:] = text.encode("utf-8", "replace")[: PLACE_BYTES - 1].ljust(PLACE_BYTES, b"\0")
+
+    def find(self, severity: str, rule: str, message: str) -> None:
+        """Write a finding."""
+        self._findings.write(json.dumps({"severity": severity, "rule": rule, "message": message}) + "\n")
+
+    def stop(self, rule: str, message: str) -> Stopped:
+        """Write an error after which the experiment ends; raise what is returned."""
+        self.find("error", rule, message)
+        return Stopped()
+
+    def done(self) -> None:
+        """Note that the experiment has come to its end."""
+        self._findings.write('{"done": true}\n')
+
+
+class Library:
+    """A loaded binary and one instance of its FMU."""
+
+    prefix = ""
+
+    def __init__(self, plan: dict[str, Any], recorder: Recorder) -> None:
+        self.plan, self.recorder = plan, recorder
+        self.messages: list[str] = []
+        self.variables = [Variable(*entry) for entry in plan["variables"]]
+        self.handle: c.c_void_p | None = None
+        recorder.at("loading the binary")
+        try:
+            self.library = c.CDLL(plan["binary"])
+        except OSError as error:
+            raise recorder.stop("run.load", f"The binary cannot be loaded: {error}.") from error
+
+    def function(self, name: str) -> Callable[..., Any]:
+        """Look up a function."""
+        try:
+            found: Callable[..., Any] = getattr(self.library, self.prefix + name)
+        except AttributeError as error:
+            raise self.recorder.stop("run.load", f"{self.prefix}{name} is missing in the binary.") from error
+        return found
+
+    def call(self, name: str, *arguments: Any, shown: str = "") -> int:
+        """Call a function of the instance and return its status."""
+        self.recorder.at(f"{self.prefix}{name}({shown})")
+        return int(self.function(name)(self.handle, *arguments))
+
+    def do(self, name: str, *arguments: Any, shown: str = "") -> None:
+        """Call a function that must succeed here."""
+        status = self.call(name, *arguments, shown=shown)
+        if status not in (OK, WARNING):
+            raise self.recorder.stop(
+                "run.refused",
+                f"{self.prefix}{name}({shown}) returns {self.status(status)} in a legal call: {self.said()}.",
+            )
+
+    def said(self) -> str:
+        """Return the last message of the FMU."""
+        return self.messages[-1][:300] if self.messages else "it logged no message"
+
+    @staticmethod
+    def status(number: int) -> str:
+        """Return the name of a status."""
+        return STATUS[number] if 0 <= number < len(STATUS) else f"the unknown status {number}"
+
+    def logged(self, message: bytes | None) -> None:
+        """Keep a message of the FMU, a bounded number of them."""
+        del self.messages[:-50]
+        self.messages.append((message or b"").decode("utf-8", "replace"))

@@ -1,0 +1,174 @@
+"""The experiments of the smoke run; each is made in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from fmu.check.child.calls import OK, WARNING, Recorder, Stopped
+from fmu.check.child.fmi2 import Fmi2
+from fmu.check.child.fmi3 import Fmi3
+from fmu.check.child.runs import RUNS, Bits, Run
+
+POINTS = 200
+
+
+def life_cycle(fmu: Any, recorder: Recorder) -> None:
+    """Instantiate, run, reset, run again: equal results; terminate, free."""
+    _instantiate(fmu, recorder)
+    first = _whole(fmu, recorder)
+    fmu.do("Reset")
+    second = _whole(fmu, recorder)
+    _compare(recorder, "run.reset", "after a reset", first, second)
+    fmu.do("Terminate") if not second[2] else None
+    fmu.free()
+    if not fmu.plan["once"]:
+        _instantiate(fmu, recorder)
+        third = _whole(fmu, recorder)
+        _compare(recorder, "run.repeat", "in a second instance", first, third)
+        fmu.free()
+
+
+def state(fmu: Any, recorder: Recorder) -> None:
+    """Get, run, set, run: equal results, also by way of bytes."""
+    _instantiate(fmu, recorder)
+    run = _run(fmu, recorder)
+    run.begin()
+    half = max(fmu.plan["points"] // 2, 1)
+    run.advance(half)
+    if run.ended:
+        recorder.find("note", "run.state", "The state was not checked, since the run ends early.")
+        fmu.free()
+        return
+    saved, mark = fmu.save(), run.mark()
+    here, onward = run.read_all(), run.advance(half)
+    _back(fmu, run, saved, mark)
+    _compare(
+        recorder,
+        "run.state",
+        "after the state was set again",
+        (here, onward, False),
+        (run.read_all(), run.advance(half), False),
+    )
+    if fmu.plan["serialize"]:
+        content = fmu.serialize(saved)
+        if fmu.serialize(saved) != content:
+            recorder.find(
+                "warning",
+                "run.serialize",
+                "Serialising one state twice gives different bytes: addresses may be among them.",
+            )
+        copy = fmu.deserialize(content)
+        _back(fmu, run, copy, mark)
+        found = (run.read_all(), run.advance(half), False)
+        _compare(recorder, "run.serialize", "after the state was set from bytes", (here, onward, False), found)
+        fmu.release(copy)
+    fmu.release(saved)
+    fmu.free()
+
+
+def token(fmu: Any, recorder: Recorder) -> None:
+    """A wrong token is refused."""
+    if fmu.instantiate(fmu.plan["token"] + "-wrong"):
+        name = "GUID" if fmu.prefix == "fmi2" else "instantiation token"
+        recorder.find(
+            "error",
+            "run.token",
+            f"A wrong {name} is accepted: by it an importer learns that description and binary differ.",
+        )
+
+
+def bad_steps(fmu: Any, recorder: Recorder) -> None:
+    """Steps of NaN and of negative length are refused, in bounded time."""
+    for h, name in ((math.nan, "NaN"), (-fmu.plan["step"], "a negative length")):
+        _instantiate(fmu, recorder)
+        run = _run(fmu, recorder)
+        run.begin()
+        if run.ended:
+            fmu.free()
+            return
+        step = fmu.step(run.t, h)
+        if step.status in (OK, WARNING):
+            recorder.find(
+                "error",
+                "run.bad_step",
+                f"doStep({run.t!r}, {h!r}), a step of {name}, returns {fmu.status(step.status)}.",
+            )
+        fmu.free()
+
+
+EXPERIMENTS = {"life_cycle": life_cycle, "state": state, "token": token, "bad_steps": bad_steps}
+
+
+def _instantiate(fmu: Any, recorder: Recorder) -> None:
+    if not fmu.instantiate(fmu.plan["token"]):
+        raise recorder.stop("run.instantiate", f"The FMU cannot be instantiated with its own token: {fmu.said()}.")
+
+
+def _run(fmu: Any, recorder: Recorder) -> Run:
+    return RUNS[fmu.plan["kind"]](fmu, recorder)
+
+
+def _whole(fmu: Any, recorder: Recorder) -> tuple[list[bytes], list[Bits], bool]:
+    run = _run(fmu, recorder)
+    run.begin()
+    values = run.read_all()
+    run.point()
+    return values, run.advance(fmu.plan["points"]), run.ended
+
+
+def _back(fmu: Any, run: Run, saved: Any, mark: tuple[Any, ...]) -> None:
+    fmu.restore(saved)
+    run.back(mark)
+
+
+def _compare(
+    recorder: Recorder,
+    rule: str,
+    when: str,
+    expected: tuple[list[bytes], list[Bits], bool],
+    found: tuple[list[bytes], list[Bits], bool],
+) -> None:
+    if expected[0] != found[0]:
+        recorder.find("error", rule, f"The variables have other values {when} than at first.")
+    elif expected[1] != found[1]:
+        pairs = zip(expected[1], found[1], strict=False)
+        t = next((first[0] for first, second in pairs if first != second), math.nan)
+        recorder.find(
+            "error", rule, f"The outputs {when} differ from those at first, from t = {t!r} on: not one bit may."
+        )
+
+
+def main(plan_path: str) -> int:
+    """Make the experiment of a plan."""
+    plan = json.loads(Path(plan_path).read_text(encoding="utf-8"))
+    _limit(plan["memory"], plan["cpu"], plan["file_bytes"])
+    recorder = Recorder(plan["place"], plan["findings"])
+    try:
+        fmu = (Fmi2 if plan["major"] == 2 else Fmi3)(plan, recorder)
+        EXPERIMENTS[plan["experiment"]](fmu, recorder)
+    except Stopped:
+        pass
+    except MemoryError:
+        recorder.find("error", "run.memory", "The process is out of memory.")
+    recorder.at("leaving the process")
+    recorder.done()
+    return 0
+
+
+def _limit(memory: int, cpu: int, file_bytes: int) -> None:
+    if sys.platform == "win32":
+        return
+    import resource
+
+    wanted = {"RLIMIT_AS": memory, "RLIMIT_CPU": cpu, "RLIMIT_FSIZE": file_bytes, "RLIMIT_CORE": 0}
+    for name, limit in wanted.items():
+        hard = resource.getrlimit(getattr(resource, name))[1]
+        bound = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        try:
+            resource.setrlimit(getattr(resource, name), (bound, bound))
+        except (ValueError, OSError):  # macOS refuses limits of the address space
+            continue

@@ -1,0 +1,194 @@
+"""FMI 2.0 as the experiments use it."""
+
+from __future__ import annotations
+
+import ctypes as c
+import sys
+from pathlib import Path
+from typing import Any
+
+from fmu.check.child.calls import DISCARD, OK, Library, Recorder, Step, Update, Variable
+
+TYPES: dict[str, tuple[str, Any]] = {
+    "Real": ("Real", c.c_double),
+    "Integer": ("Integer", c.c_int),
+    "Enumeration": ("Integer", c.c_int),
+    "Boolean": ("Boolean", c.c_int),
+    "String": ("String", c.c_char_p),
+}
+_LOGGER = c.CFUNCTYPE(None, c.c_void_p, c.c_char_p, c.c_int, c.c_char_p, c.c_char_p)
+_ALLOCATE = c.CFUNCTYPE(c.c_void_p, c.c_size_t, c.c_size_t)
+_FREE = c.CFUNCTYPE(None, c.c_void_p)
+_FINISHED = c.CFUNCTYPE(None, c.c_void_p, c.c_int)
+_LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
+
+
+class _Callbacks(c.Structure):
+    _fields_ = [
+        ("logger", _LOGGER),
+        ("allocate", _ALLOCATE),
+        ("free", _FREE),
+        ("finished", _FINISHED),
+        ("environment", c.c_void_p),
+    ]
+
+
+class _EventInfo(c.Structure):
+    _fields_ = [
+        ("again", c.c_int),
+        ("terminate", c.c_int),
+        ("nominals_changed", c.c_int),
+        ("values_changed", c.c_int),
+        ("defined", c.c_int),
+        ("time", c.c_double),
+    ]
+
+
+class Fmi2(Library):
+    """One instance of an FMI 2.0 FMU."""
+
+    prefix = "fmi2"
+    events = False
+
+    def __init__(self, plan: dict[str, Any], recorder: Recorder) -> None:
+        super().__init__(plan, recorder)
+        # The memory functions are the C library's own: a Python function between would be the check's, not the FMU's.
+        memory = c.CDLL("msvcrt" if sys.platform == "win32" else None)
+        self._callbacks = _Callbacks(
+            _LOGGER(lambda environment, name, status, category, message: self.logged(message)),
+            c.cast(memory.calloc, _ALLOCATE),
+            c.cast(memory.free, _FREE),
+            _FINISHED(0),
+            None,
+        )
+
+    def instantiate(self, token: str) -> bool:
+        """Make an instance; tell whether there is one."""
+        self.recorder.at("fmi2Instantiate")
+        function = self.function("Instantiate")
+        function.restype = c.c_void_p  # type: ignore[attr-defined]
+        kind = 1 if self.plan["kind"] == "CoSimulation" else 0
+        folder = self.plan["resources"]
+        location = Path(folder).as_uri().encode() if folder else None
+        found = function(b"checked", kind, token.encode(), location, c.byref(self._callbacks), 0, 0)
+        self.handle = c.c_void_p(found) if found else None
+        return bool(found)
+
+    def free(self) -> None:
+        """Free the instance."""
+        self.recorder.at("fmi2FreeInstance")
+        function = self.function("FreeInstance")
+        function.restype = None  # type: ignore[attr-defined]
+        function(self.handle)
+        self.handle = None
+
+    def enter_initialization(self) -> None:
+        """Set up the planned experiment and enter its initialisation."""
+        start, stop = c.c_double(self.plan["start"]), c.c_double(self.plan["stop"])
+        self.do("SetupExperiment", 0, c.c_double(0.0), start, 1, stop)
+        self.do("EnterInitializationMode")
+
+    def set(self, variable: Variable) -> None:
+        """Set a variable to its start value."""
+        kind, made = TYPES[variable.type]
+        [text] = variable.start or [""]
+        value: Any = text.encode() if kind == "String" else int(text in ("true", "1")) if kind == "Boolean" else text
+        if kind == "Real":
+            value = float(text.replace("INF", "inf"))
+        elif kind == "Integer":
+            value = int(text)
+        references = (c.c_uint * 1)(variable.reference)
+        self.do(f"Set{kind}", references, c.c_size_t(1), (made * 1)(value), shown=variable.name)
+
+    def get(self, variable: Variable) -> tuple[list[Any], bytes]:
+        """Return a variable's values, and their bits."""
+        kind, made = TYPES[variable.type]
+        array = (made * 1)()
+        self.do(f"Get{kind}", (c.c_uint * 1)(variable.reference), c.c_size_t(1), array, shown=variable.name)
+        if kind == "String":
+            if array[0] is None:
+                raise self.recorder.stop("run.string", f"fmi2GetString({variable.name}) gives a NULL pointer.")
+            return [], array[0]
+        return list(array), bytes(array)
+
+    def update(self) -> Update:
+        """Update discrete states once."""
+        info = _EventInfo()
+        self.do("NewDiscreteStates", c.byref(info))
+        return Update(bool(info.again), bool(info.terminate), info.time if info.defined else None)
+
+    def step(self, t: float, h: float) -> Step:
+        """Do a step; the statuses Error and Fatal are returned as such."""
+        status = self.call("DoStep", c.c_double(t), c.c_double(h), 1, shown=f"{t!r}, {h!r}")
+        if status != DISCARD:
+            return Step(status, False, False, False, t + h)
+        time, terminated = c.c_double(t), c.c_int()
+        if self.call("GetRealStatus", _LAST_SUCCESSFUL_TIME, c.byref(time)) != OK:
+            time = c.c_double(t)
+        if self.call("GetBooleanStatus", _TERMINATED, c.byref(terminated)) != OK:
+            terminated = c.c_int(0)
+        return Step(status, False, bool(terminated.value), True, time.value)
+
+    # Model Exchange.
+
+    def counts(self) -> tuple[int, int]:
+        """Return the numbers of continuous states and event indicators; FMI 2 has no functions for them."""
+        return self.plan["states"], self.plan["indicators"]
+
+    def vector(self, name: str, size: int) -> list[float]:
+        """Call a function that fills an array: `derivatives`, `states`, `indicators`, `nominals`."""
+        array = (c.c_double * max(size, 1))()
+        if size:
+            self.do(_VECTORS[name], array, c.c_size_t(size))
+        return list(array)[:size]
+
+    def set_states(self, t: float, x: list[float]) -> None:
+        """Set time and continuous states."""
+        self.do("SetTime", c.c_double(t), shown=repr(t))
+        if x:
+            self.do("SetContinuousStates", (c.c_double * len(x))(*x), c.c_size_t(len(x)))
+
+    def completed_step(self) -> tuple[bool, bool]:
+        """Tell the FMU of a completed step; return whether it wants an event, and an end."""
+        event, terminate = c.c_int(), c.c_int()
+        self.do("CompletedIntegratorStep", 1, c.byref(event), c.byref(terminate))
+        return bool(event.value), bool(terminate.value)
+
+    # State.
+
+    def save(self) -> c.c_void_p:
+        """Get the FMU state."""
+        state = c.c_void_p()
+        self.do("GetFMUstate", c.byref(state))
+        return state
+
+    def restore(self, state: c.c_void_p) -> None:
+        """Set the FMU state."""
+        self.do("SetFMUstate", state)
+
+    def release(self, state: c.c_void_p) -> None:
+        """Free the FMU state."""
+        self.do("FreeFMUstate", c.byref(state))
+
+    def serialize(self, state: c.c_void_p) -> bytes:
+        """Return the bytes of an FMU state."""
+        size = c.c_size_t()
+        self.do("SerializedFMUstateSize", state, c.byref(size))
+        content = (c.c_char * max(size.value, 1))()
+        self.do("SerializeFMUstate", state, content, size)
+        return bytes(content)[: size.value]
+
+    def deserialize(self, content: bytes) -> c.c_void_p:
+        """Return the FMU state of bytes."""
+        state = c.c_void_p()
+        array = (c.c_char * max(len(content), 1)).from_buffer_copy(content or b"\0")
+        self.do("DeSerializeFMUstate", array, c.c_size_t(len(content)), c.byref(state))
+        return state
+
+
+_VECTORS = {
+    "derivatives": "GetDerivatives",
+    "states": "GetContinuousStates",
+    "indicators": "GetEventIndicators",
+    "nominals": "GetNominalsOfContinuousStates",
+}
