@@ -18,6 +18,7 @@ from pathlib import Path
 
 from fmu.compiler import Task, compiler_identity, find_compiler, is_zig, run_all, zig_compiler
 from fmu.errors import BuildError
+from fmu.macho import export_only
 from fmu.package import ARCHIVE_DATE, check_target, package, replacing
 from fmu.platforms import PLATFORMS, Platform, chosen_platforms, library_members, this_platform
 
@@ -230,7 +231,7 @@ def _build(
             progress(f"linking for {', '.join(platform.name for platform in platforms)}")
         links = [_link(toolchain, platform, sources, scratch) for platform, toolchain in toolchains.items()]
         run_all(links, scratch, progress)
-        return {platform: (scratch / platform.name / _library_name(platform)).read_bytes() for platform in platforms}
+        return {platform: _library(toolchain, platform, scratch) for platform, toolchain in toolchains.items()}
 
 
 def _target(command: Sequence[str], platform: Platform) -> list[str]:
@@ -301,3 +302,8 @@ def _link(command: Sequence[str], platform: Platform, sources: Sequence[Path], s
     return Task(
         arguments, scratch / platform.name, f"link the library for {platform.name}", f"built for {platform.name}"
     )
+
+
+def _library(command: Sequence[str], platform: Platform, scratch: Path) -> bytes:
+    library = (scratch / platform.name / _library_name(platform)).read_bytes()
+    return export_only(library, "_fmi") if platform.system == "darwin" and is_zig(command) else library
