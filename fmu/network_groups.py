@@ -117,7 +117,7 @@ def _read(traced: Trace) -> tuple[Structure, list[float]]:
     """Return what is the same in equal maps, and the constants in order."""
     automaton = traced.automaton
     structure: list[object] = [traced.layout.sizes[kind] for kind in Kind]
-    structure += [automaton.has_flow_set, *(info.trigger for info in automaton.jumps)]
+    structure += [automaton.has_flow_set, *((info.trigger, info.internal) for info in automaton.jumps)]
     constants: list[float] = []
     for function in _named_functions(traced).values():
         instructions: list[object] = []

@@ -8,12 +8,16 @@ import casadi as ca
 
 from fmu.errors import TraceError
 from fmu.network_groups import Group
+from fmu.network_kin import Kin, watched
 from fmu.network_members import Members
 from fmu.network_pattern import NetworkPattern
 from fmu.trace import Trace, _Tracer, trace
 from hybrid_model import Automaton, Composition
+from hybrid_model.layout import Layout
 from hybrid_model.transitions import Trigger
 from hybrid_model.variables import Kind
+
+_MOST_KIN = 8
 
 
 class _PartTracer(_Tracer):
@@ -38,7 +42,20 @@ def part_traces(parts: Sequence[Automaton]) -> tuple[list[Trace], list[int]]:
     alike : list of int
         For each part the number of its trace.
     """
-    return [_PartTracer(part).trace() for part in parts], list(range(len(parts)))
+    traces: list[Trace] = []
+    alike: list[int] = []
+    kin: dict[tuple[object, ...], list[tuple[Kin, int]]] = {}
+    for part in parts:
+        known = kin.setdefault((type(part), *Layout(part).sizes.values(), len(part.jumps)), [])
+        number = next((number for one, number in known if one.has(part)), None)
+        if number is None:
+            number = len(traces)
+            with watched(part) as reads:
+                traces.append(_PartTracer(part).trace())
+            # Parts that all differ are not compared with all others.
+            known[:] = [(Kin(part, reads), number), *known[: _MOST_KIN - 1]]
+        alike.append(number)
+    return traces, alike
 
 
 def require_known_times(
