@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks import step_cost
 from benchmarks.contenders import CONTENDERS
 from benchmarks.measure import Entry, choose, fastest_scipy, score
 from benchmarks.problems import MIRRORED, PAPER_DYNAMIC, PROBLEMS, Ball, Outcome
+
+from hybrid_model.models import BouncingBall
 
 SHORT_PAPER = replace(PAPER_DYNAMIC, scenario=replace(PAPER_DYNAMIC.scenario, stop_time=8.0))
 SHORT_BALL = Ball(impacts=5)
@@ -87,3 +90,47 @@ def test_every_contender_finds_the_events_of_a_short_run(contender, problem):
     (entry,) = choose(contender, problem, (1e-6,))
     assert entry.reached
     assert entry.score.state_error < 1e-4  # event times of 1e-6 s, speeds up to 5 m/s
+
+
+def run_driver(tmp_path, *balls, steps=60):
+    return step_cost.run(step_cost.compile_driver(tmp_path), balls, rounds=2, steps=steps)
+
+
+def test_the_c_driver_runs_fmus_past_an_impact_and_times_every_call(tmp_path, exported):
+    own = step_cost.contender("own", exported(BouncingBall()), tmp_path)
+    euler = step_cost.euler_ball(tmp_path)
+    measured = run_driver(tmp_path, own, euler)
+    assert set(measured["own"].times) == set(step_cost.MEASURED)
+    assert all(len(times) == 2 and min(times) > 0.0 for times in measured["own"].times.values())
+    # 60 steps of 10 ms, one of them split at the impact, obeying the announced time or stopping by itself.
+    assert set(measured["own"].counts.values()) == {(61, 1)}
+    t, h, v = np.array(measured["own"].values).T
+    impact = np.sqrt(2.0 / 9.81)
+    rebound = 0.7 * 9.81 * impact
+    # A flight is a parabola: the solver is exact up to rounding, its tolerance is 1e-13.
+    expected = np.where(t < impact, 1.0 - 4.905 * t**2, rebound * (t - impact) - 4.905 * (t - impact) ** 2)
+    np.testing.assert_allclose(h, expected, atol=1e-11)
+    np.testing.assert_allclose(v, np.where(t < impact, 0.0, rebound + 9.81 * impact) - 9.81 * t, atol=1e-11)
+    assert max(step_cost.impact_errors(measured["own"].values)) < 1e-11
+    # Forward Euler finds the floor at the end of a step of 1 ms, the second one after the impact.
+    late, _ = step_cost.impact_errors(measured[euler.name].values)
+    assert late == pytest.approx(0.453 - impact, abs=1e-9)
+
+
+def test_the_c_driver_says_what_a_contender_refuses(tmp_path, exported):
+    own = step_cost.contender("own", exported(BouncingBall()), tmp_path)
+    with pytest.raises(step_cost.DriverError, match="instantiation token"):
+        run_driver(tmp_path, replace(own, token="another"))
+    # Past its Zeno time, 2.5586 s, the ball ends its run.
+    with pytest.raises(step_cost.DriverError, match="Zeno"):
+        run_driver(tmp_path, own, steps=260)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("package", ["pythonfmu", "pythonfmu3"])
+def test_the_c_driver_runs_balls_in_python(tmp_path, package):
+    pytest.importorskip(package)
+    ball = step_cost.python_ball(tmp_path, package)
+    measured = run_driver(tmp_path, ball, step_cost.own_ball(tmp_path))
+    # Both in closed form, rounded some 50 times.
+    assert max(step_cost.impact_errors(measured[ball.name].values)) < 1e-12

@@ -184,7 +184,7 @@ static bool read_plan(int argc, char **argv, Plan *plan, Contender *contenders, 
     return *n > 0 && plan->flight <= plan->steps;
 }
 
-int main(int argc, char **argv)
+static int run_all(int argc, char **argv)
 {
     static Contender contenders[MOST_CONTENDERS];
     Plan plan = {.step = 0.01, .steps = 200, .flight = 40, .rounds = 100};
@@ -201,4 +201,12 @@ int main(int argc, char **argv)
     for (size_t k = 0; k < n; k++)
         contenders[k].interface->unload(&contenders[k]);
     return EXIT_SUCCESS;
+}
+
+int main(int argc, char **argv)
+{
+    int status = run_all(argc, argv);
+    fflush(NULL);
+    /* Not by exit: an embedded interpreter's handlers may wait for each other for ever. */
+    _Exit(status);
 }
