@@ -1,122 +1,163 @@
-"""Compiling and packaging: what is exported, what is reproducible, and what an error leaves behind."""
+"""Compiling and packaging: what is kept between builds, what is reproducible, and what an error leaves behind."""
 
 import ctypes
-import re
+import os
 import shutil
+import signal
 import subprocess
+import sys
+import time
 import zipfile
 from pathlib import Path
 
 import pytest
 
-from fmu.build import BuildError, compile_fmu, find_compiler, fmi_headers, package, runtime_sources
+import fmu.build
+from fmu.build import (
+    BuildError,
+    binaries,
+    check_target,
+    compile_fmu,
+    find_compiler,
+    fmi_headers,
+    package,
+    runtime_sources,
+)
 
-# A model without states, jumps or outputs: enough to link the runtime, nothing that a trace would produce otherwise.
-EMPTY_MODEL = """
-#include "model.h"
-static int nothing(const double **arg, double **res, long long *iw, double *w, int mem)
-{
-    (void)arg, (void)res, (void)iw, (void)w, (void)mem;
-    return 0;
-}
-static const ModelVariable variables[] = {{"time", TYPE_FLOAT64, BANK_TIME, 0, false, false}};
-const Model model = {
-    .name = "Empty", .token = "token", .n_variables = 1, .n_arg = 5, .n_res = 2, .predictable = true,
-    .start = nothing, .flow = nothing, .margins = nothing, .times = nothing, .outputs = nothing,
-    .variables = variables,
-};
+# The smallest library with an FMI function, and what a model's generated code may hold.
+VERSION = """
+#include "fmi3Functions.h"
+static double gamma(double x) { return 42.0 * x; }
+double hidden(double x) { return gamma(x); }
+const char *fmi3GetVersion(void) { return hidden(1.0) > 0.0 ? "3.0" : ""; }
 """
 
-needs_nm = pytest.mark.skipif(shutil.which("nm") is None, reason="nm is not installed")
+posix = pytest.mark.skipif(sys.platform == "win32", reason="a wrapper around the compiler is a shell script")
 
 
-@pytest.fixture(scope="module")
-def library(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The runtime linked with an empty model."""
-    return build_empty(tmp_path_factory.mktemp("build"))
-
-
-def build_empty(folder: Path) -> Path:
+def build_version(folder: Path, **options: object) -> Path:
     source = folder / "model.c"
-    source.write_text(EMPTY_MODEL)
-    return compile_fmu([source, *runtime_sources()], [fmi_headers()], folder / "Empty.so")
+    source.write_text(VERSION)
+    return compile_fmu([source], [fmi_headers()], folder / "Version.so", **options)
 
 
 def leftovers(folder: Path) -> set[str]:
     return {path.name for path in folder.iterdir()}
 
 
-def symbols(library: Path) -> set[str]:
-    listing = subprocess.run(["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True)
-    return {line.split()[-1] for line in listing.stdout.splitlines()}
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files, which must be empty in the end."""
+    folder = tmp_path / "temporary files"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    return folder
 
 
-@needs_nm
-def test_exports_all_fmi_functions_and_nothing_else(library: Path) -> None:
-    header = (fmi_headers() / "fmi3Functions.h").read_text()
-    declared = set(re.findall(r"^FMI3_Export fmi3\w+TYPE\s+(fmi3\w+);", header, re.MULTILINE))
-    assert len(declared) > 70
-    assert symbols(library) == declared
+@pytest.fixture
+def logged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A compiler that writes down its arguments, a call a line."""
+    script, log = tmp_path / "bin" / "logged-cc", tmp_path / "calls.txt"
+    script.parent.mkdir()
+    script.write_text(f'#!/bin/sh\necho "$@" >> "{log}"\nexec {find_compiler()[0]} "$@"\n')
+    script.chmod(0o755)
+    log.write_text("")
+    monkeypatch.setenv("CC", str(script))
+    return log
 
 
-@needs_nm
-def test_needs_only_the_c_library(library: Path) -> None:
-    listing = subprocess.run(["nm", "-D", "--undefined-only", library], capture_output=True, text=True, check=True)
-    needed = {line.split()[-1] for line in listing.stdout.splitlines() if "@GLIBC" in line}
-    foreign = {line.split()[-1] for line in listing.stdout.splitlines()} - needed
-    assert foreign <= {"__cxa_finalize", "__gmon_start__", "_ITM_deregisterTMCloneTable", "_ITM_registerTMCloneTable"}
+def compiled(log: Path) -> list[str]:
+    """The names of the files compiled so far."""
+    calls = [line.split() for line in log.read_text().splitlines()]
+    return [Path(call[call.index("-c") + 1]).name for call in calls if "-c" in call]
 
 
-@needs_nm
-def test_runtime_has_no_writable_globals(tmp_path: Path) -> None:
-    """Two instances share nothing: no object file of the runtime has data that can be written."""
-    for source in runtime_sources():
-        target = tmp_path / f"{source.stem}.o"
-        # Without position independence, tables of pointers are constants for nm as well.
-        flags = ["-std=c99", "-O2", "-fno-pic", "-fno-pie", "-c", f"-I{fmi_headers()}", str(source), "-o", str(target)]
-        subprocess.run([*find_compiler(), *flags], check=True)
-        listing = subprocess.run(["nm", target], capture_output=True, text=True, check=True)
-        writable = [line for line in listing.stdout.splitlines() if re.search(r" [bBdDcCsSgG] ", line)]
-        assert writable == [], source.name
+# ---- one compiler, many files ----
 
 
-def test_library_loads_and_tells_its_version(library: Path) -> None:
-    loaded = ctypes.CDLL(str(library))
-    loaded.fmi3GetVersion.restype = ctypes.c_char_p
-    assert loaded.fmi3GetVersion() == b"3.0"
+@posix
+def test_the_runtime_is_compiled_once_a_process(logged, tmp_path, monkeypatch):
+    monkeypatch.setattr(fmu.build, "_objects", {})
+    sources = runtime_sources()
+    for k in range(3):
+        source = tmp_path / str(k) / "model.c"
+        source.parent.mkdir()
+        # Without a model the runtime does not link: that comes after the compiling.
+        source.write_text(f"int model_{k};\n")
+        with pytest.raises(BuildError, match="link"):
+            compile_fmu([source, *sources], [fmi_headers()], tmp_path / "Model.so")
+    assert sorted(compiled(logged)) == sorted([source.name for source in sources] + 3 * ["model.c"])
 
 
-def test_same_sources_in_two_folders_give_the_same_bytes(tmp_path: Path) -> None:
-    folders = [tmp_path / "one", tmp_path / "another-with-a-longer-name"]
-    for folder in folders:
-        folder.mkdir()
-    first, second = (build_empty(folder).read_bytes() for folder in folders)
-    assert first == second
-    assert str(tmp_path).encode() not in first
+@posix
+@pytest.mark.parametrize("change", ["source", "header", "flags", "compiler", "nothing"])
+def test_kept_objects_are_those_of_the_same_build(change, logged, tmp_path, monkeypatch):
+    """Whatever changes an object makes a new one."""
+    runtime = tmp_path / "runtime"
+    runtime.mkdir()
+    (runtime / "value.h").write_text("#define VALUE 1\n")
+    (runtime / "version.c").write_text(
+        '#include "fmi3Functions.h"\n#include "value.h"\nconst char *fmi3GetVersion(void) { return "v" + VALUE; }\n'
+    )
+    monkeypatch.setattr(fmu.build, "RUNTIME", runtime)
+    monkeypatch.setattr(fmu.build, "_objects", {})
+    monkeypatch.setattr(fmu.build, "STRICT_FLAGS", ())
+    compile_fmu([runtime / "version.c"], [fmi_headers()], tmp_path / "One.so")
+    if change == "source":
+        (runtime / "version.c").write_text(
+            '#include "fmi3Functions.h"\nconst char *fmi3GetVersion(void) { return ""; }\n'
+        )
+    elif change == "header":
+        (runtime / "value.h").write_text("#define VALUE 0\n")
+    elif change == "flags":
+        monkeypatch.setattr(fmu.build, "COMMON_FLAGS", (*fmu.build.COMMON_FLAGS, "-fno-builtin"))
+    elif change == "compiler":
+        script = Path(os.environ["CC"])
+        script.write_text(script.read_text() + "# another version\n")
+    compile_fmu([runtime / "version.c"], [fmi_headers()], tmp_path / "Two.so")
+    assert len(compiled(logged)) == (1 if change == "nothing" else 2)
 
 
-def test_compiler_error_is_shown_and_leaves_nothing(tmp_path: Path) -> None:
+def test_compiler_error_is_shown_and_leaves_nothing(tmp_path, temporary):
     source = tmp_path / "model.c"
     source.write_text("int broken(void) { return missing; }\n")
     with pytest.raises(BuildError, match=r"(?s)compile 'model.c'.*missing"):
         compile_fmu([source], [], tmp_path / "out" / "Model.so")
-    assert leftovers(tmp_path) == {"model.c"}
+    assert leftovers(tmp_path) == {"model.c", temporary.name}
+    assert leftovers(temporary) == set()
 
 
-def test_failed_link_keeps_the_old_library(tmp_path: Path) -> None:
+def test_long_reports_are_shortened_to_their_beginning(tmp_path):
     source = tmp_path / "model.c"
-    source.write_text("int twice;\n")
-    (tmp_path / "other.c").write_text("int twice = 1; int again(void); int once(void) { return again(); }\n")
-    source.write_text("int twice = 2;\n")
+    source.write_text("".join(f"int f{k}(void) {{ return missing_{k}; }}\n" for k in range(1000)))
+    with pytest.raises(BuildError) as caught:
+        compile_fmu([source], [], tmp_path / "Model.so")
+    assert "missing_0" in str(caught.value)
+    assert "missing_999" not in str(caught.value)
+    assert "more lines" in str(caught.value)
+    assert len(str(caught.value)) < 15_000
+
+
+def test_failed_link_keeps_the_old_library(tmp_path, temporary):
+    (tmp_path / "model.c").write_text("int twice = 2;\n")
+    (tmp_path / "other.c").write_text("int twice = 1;\n")
     target = tmp_path / "Model.so"
     target.write_bytes(b"old")
     with pytest.raises(BuildError, match=r"(?s)link the library.*twice"):
-        compile_fmu([source, tmp_path / "other.c"], [], target)
+        compile_fmu([tmp_path / "model.c", tmp_path / "other.c"], [], target)
     assert target.read_bytes() == b"old"
-    assert leftovers(tmp_path) == {"model.c", "other.c", "Model.so"}
+    assert leftovers(tmp_path) == {"model.c", "other.c", "Model.so", temporary.name}
+    assert leftovers(temporary) == set()
 
 
-def test_missing_and_ambiguous_sources_are_named(tmp_path: Path) -> None:
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows links nothing that is missing anyway")
+def test_functions_that_are_nowhere_are_found_when_linking_not_by_the_importer(tmp_path):
+    (tmp_path / "model.c").write_text("int nowhere(void); int once(void) { return nowhere(); }\n")
+    with pytest.raises(BuildError, match=r"(?s)link the library.*nowhere"):
+        compile_fmu([tmp_path / "model.c"], [], tmp_path / "Model.so")
+
+
+def test_missing_and_ambiguous_sources_are_named(tmp_path):
     with pytest.raises(BuildError, match=r"'absent.c' does not exist"):
         compile_fmu([tmp_path / "absent.c"], [], tmp_path / "Model.so")
     for name in ("a", "b"):
@@ -126,14 +167,135 @@ def test_missing_and_ambiguous_sources_are_named(tmp_path: Path) -> None:
         compile_fmu([tmp_path / "a" / "model.c", tmp_path / "b" / "model.c"], [], tmp_path / "Model.so")
 
 
-def test_names_with_spaces_and_shell_characters_are_only_names(tmp_path: Path) -> None:
-    folder = tmp_path / "a $(touch owned) b"
-    folder.mkdir()
-    build_empty(folder)
-    assert leftovers(folder) == {"model.c", "Empty.so"}
+@posix
+def test_an_interrupt_stops_the_compilers_and_leaves_nothing(tmp_path):
+    """The compiler here starts a program that would go on for a minute, as gcc starts cc1."""
+    script = tmp_path / "slow-cc"
+    script.write_text(
+        f'#!/bin/sh\ncase "$*" in *--version*) exit 0;; esac\n'
+        f'touch "$TMPDIR/cc1.s"\necho $$ >> "{tmp_path}/pids"\nsleep 60\n'
+    )
+    script.chmod(0o755)
+    files = tmp_path / "temporary"
+    files.mkdir()
+    (tmp_path / "model.c").write_text("int x;\n")
+    (tmp_path / "more.c").write_text("int y;\n")
+    code = (
+        "from pathlib import Path; from fmu.build import compile_fmu; "
+        "compile_fmu([Path('model.c'), Path('more.c')], [], Path('out/Model.so'))"
+    )
+    environment = {**os.environ, "CC": str(script), "TMPDIR": str(files)}
+    child = subprocess.Popen([sys.executable, "-c", code], cwd=tmp_path, env=environment, stderr=subprocess.PIPE)
+    try:
+        while not (tmp_path / "pids").exists():
+            assert child.poll() is None
+            time.sleep(0.01)
+        assert leftovers(files) != set()
+        child.send_signal(signal.SIGINT)
+        # Far less than the minute that the compilers would take.
+        _, errors = child.communicate(timeout=30)
+    finally:
+        child.kill()
+    assert b"KeyboardInterrupt" in errors
+    assert leftovers(files) == set()
+    assert not (tmp_path / "out").exists()
+    for pid in (tmp_path / "pids").read_text().split():
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(pid), 0)
 
 
-def test_compiler_is_taken_from_the_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+# ---- names and places ----
+
+
+@pytest.mark.parametrize(
+    "name", ["a $(touch owned) b", "100% #1", "größe 漢字", "; touch owned", "-o owned", "n" * 200 + "/" + "m" * 200]
+)
+def test_names_of_folders_are_only_names(name, tmp_path):
+    folder = tmp_path / name
+    folder.mkdir(parents=True)
+    library = ctypes.CDLL(str(build_version(folder)))
+    library.fmi3GetVersion.restype = ctypes.c_char_p
+    assert library.fmi3GetVersion() == b"3.0"
+    assert leftovers(folder) == {"model.c", "Version.so"}
+    assert leftovers(tmp_path) == {Path(name).parts[0]}
+
+
+def test_files_named_like_options_or_as_long_as_can_be(tmp_path):
+    source = tmp_path / "-shared.c"
+    source.write_text(VERSION)
+    target = tmp_path / ("L" * 252 + ".so")
+    compile_fmu([source], [fmi_headers()], target)
+    assert leftovers(tmp_path) == {source.name, target.name}
+
+
+def test_relative_paths_the_folder_and_the_environment(tmp_path, monkeypatch):
+    """Paths count from the current folder, which stays, as the environment does, in success and failure."""
+    monkeypatch.chdir(tmp_path)
+    Path("model.c").write_text(VERSION)
+    Path("bad.c").write_text("int broken(void) { return missing; }\n")
+    before = os.getcwd(), dict(os.environ)
+    compile_fmu([Path("model.c")], [fmi_headers()], Path("out/Version.so"))
+    with pytest.raises(BuildError):
+        compile_fmu([Path("bad.c")], [], Path("out/Bad.so"))
+    assert (os.getcwd(), dict(os.environ)) == before
+    assert leftovers(Path("out")) == {"Version.so"}
+
+
+@posix
+def test_a_compiler_given_by_a_relative_path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("my-cc").symlink_to(shutil.which(find_compiler()[0]))
+    monkeypatch.setenv("CC", "./my-cc")
+    build_version(tmp_path)
+
+
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="needs a folder where nobody may write")
+def test_a_folder_that_is_read_only_is_refused_before_the_build(tmp_path):
+    for act in (check_target, lambda path: package({"modelDescription.xml": b"<x/>"}, path), build_beside(tmp_path)):
+        with pytest.raises(BuildError, match=r"'/proc/self/out/M.fmu' cannot be written.*Remedy"):
+            act(Path("/proc/self/out/M.fmu"))
+
+
+def build_beside(folder: Path):
+    source = folder / "model.c"
+    source.write_text(VERSION)
+    return lambda path: compile_fmu([source], [fmi_headers()], path)
+
+
+def test_targets_are_checked_without_a_trace(tmp_path):
+    check_target(tmp_path / "new" / "M.fmu")
+    assert leftovers(tmp_path / "new") == set()
+    with pytest.raises(BuildError, match="is a folder"):
+        check_target(tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BuildError, match="cannot be written"):
+        check_target(tmp_path / "file" / "M.fmu")
+
+
+@posix
+def test_permissions_are_those_the_user_gives_to_files(tmp_path):
+    mask = os.umask(0o027)
+    try:
+        library = build_version(tmp_path)
+        archive = package({"modelDescription.xml": b"<x/>"}, tmp_path / "M.fmu")
+    finally:
+        os.umask(mask)
+    assert (library.stat().st_mode & 0o777, archive.stat().st_mode & 0o777) == (0o750, 0o640)
+
+
+def test_same_sources_in_two_folders_give_the_same_bytes(tmp_path):
+    folders = [tmp_path / "one", tmp_path / "another-with-a-longer-name"]
+    for folder in folders:
+        folder.mkdir()
+    first, second = (build_version(folder).read_bytes() for folder in folders)
+    assert first == second
+    assert str(tmp_path).encode() not in first
+
+
+# ---- which compiler ----
+
+
+def test_compiler_is_taken_from_the_environment(monkeypatch):
     monkeypatch.setenv("CC", f"{find_compiler()[0]} -pipe")
     assert find_compiler()[1:] == ["-pipe"]
     monkeypatch.setenv("CC", "no-such-compiler")
@@ -141,7 +303,7 @@ def test_compiler_is_taken_from_the_environment(monkeypatch: pytest.MonkeyPatch)
         find_compiler()
 
 
-def test_no_compiler_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_compiler_says_what_to_install(monkeypatch):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
@@ -149,14 +311,36 @@ def test_no_compiler_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> No
         find_compiler()
 
 
-def test_ziglang_is_the_last_resort(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ziglang_is_the_last_resort(monkeypatch):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: object() if name == "ziglang" else None)
     assert find_compiler()[1:] == ["-m", "ziglang", "cc"]
 
 
-def test_archive_is_the_same_from_folder_and_mapping_in_any_order(tmp_path: Path) -> None:
+def test_other_platforms_need_ziglang(monkeypatch, tmp_path):
+    real = fmu.build.importlib.util.find_spec
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "ziglang" else real(name))
+    (tmp_path / "model.c").write_text(VERSION)
+    platforms = ["x86_64-linux", "aarch64-linux"]
+    with pytest.raises(BuildError, match=r"package ziglang, which is not installed. Remedy: pip install"):
+        binaries([tmp_path / "model.c"], [fmi_headers()], "M", fmi="3.0", platforms=platforms)
+
+
+@posix
+def test_a_compiler_that_is_no_program_is_named(tmp_path, monkeypatch):
+    script = tmp_path / "cc"
+    script.write_bytes(b"\x00\x01")
+    script.chmod(0o755)
+    monkeypatch.setenv("CC", str(script))
+    with pytest.raises(BuildError, match=r"could not be started: .*Remedy"):
+        build_version(tmp_path)
+
+
+# ---- archives ----
+
+
+def test_archive_is_the_same_from_folder_and_mapping_in_any_order(tmp_path):
     content = {
         "modelDescription.xml": b"<x/>",
         "binaries/x86_64-linux/M.so": b"\x7fELF",
@@ -177,13 +361,18 @@ def test_archive_is_the_same_from_folder_and_mapping_in_any_order(tmp_path: Path
 
 
 @pytest.mark.parametrize("name", ["../outside", "/absolute", "a//b", "a\\b", "c:x", "", "a/./b"])
-def test_members_stay_inside_the_archive(tmp_path: Path, name: str) -> None:
+def test_members_stay_inside_the_archive(tmp_path, name):
     with pytest.raises(BuildError, match="plain relative path"):
         package({"modelDescription.xml": b"<x/>", name: b""}, tmp_path / "M.fmu")
     assert leftovers(tmp_path) == set()
 
 
-def test_description_is_required_and_the_old_archive_stays(tmp_path: Path) -> None:
+def test_members_differ_on_systems_that_ignore_case(tmp_path):
+    with pytest.raises(BuildError, match=r"'documentation/a.html' and 'Documentation/A.html' differ in case only"):
+        package({"modelDescription.xml": b"", "documentation/a.html": b"", "Documentation/A.html": b""}, tmp_path / "M")
+
+
+def test_description_is_required_and_the_old_archive_stays(tmp_path):
     target = tmp_path / "M.fmu"
     target.write_bytes(b"old")
     with pytest.raises(BuildError, match=r"no modelDescription\.xml"):
@@ -194,7 +383,7 @@ def test_description_is_required_and_the_old_archive_stays(tmp_path: Path) -> No
     assert leftovers(tmp_path) == {"M.fmu"}
 
 
-def test_interrupted_packaging_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_interrupted_packaging_leaves_nothing(tmp_path, monkeypatch):
     def full(*arguments: object, **options: object) -> None:
         raise OSError(28, "No space left on device")
 
