@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from hybrid_model.arc import HybridArc
-from hybrid_model.consensus.figures import COLUMN, plot_broadcasts, plot_error_against_threshold
+from hybrid_model.consensus.figures import COLUMN, MARKER, plot_broadcasts, plot_error_against_threshold
 from hybrid_model.consensus.metrics import States, disagreement, gap_statistics
 from hybrid_model.consensus.network import agent_name, edges_of
 from hybrid_model.consensus.scenario_data import Scenario
@@ -74,7 +75,8 @@ def plot_all_errors(scenario: Scenario, arc: HybridArc, columns: int = 2) -> Fig
     for ax in grid.flat[n:]:
         ax.remove()
     threshold = next(line for line in grid.flat[0].lines if str(line.get_label()).startswith("threshold"))
-    figure.legend(handles=[threshold], loc="outside upper right")
+    broadcast = Line2D([], [], color="0.3", label="broadcast", **MARKER)
+    figure.legend(handles=[threshold, broadcast], loc="outside upper right", ncols=2)
     return figure
 
 
@@ -141,6 +143,7 @@ def plot_gaps_against_bounds(
     for line, k in zip(list(ax.lines), range(len(rows)), strict=False):
         line.set_label(f"agent {k + 1}")
         line.set_color(COLORS[k % len(COLORS)])
+        line.set_clip_on(False)
     smallest = gap_statistics(event_times).min
     lowest = smallest if smallest is not None else 1.0
     for (name, bound), style in zip(bounds.items(), _cycled(len(bounds)), strict=True):

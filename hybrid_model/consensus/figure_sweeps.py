@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.ticker import LogLocator, NullLocator
 
 from hybrid_model.plots import COLORS, new_axes
 
@@ -23,6 +24,9 @@ LABELS = {
     "transient": "transient factor",
 }
 """Texts of axes by the names that certificates use."""
+
+_LARGEST = 1e100
+"""A bound that is larger has overflown, or is about to; an axis that shows it shows nothing else."""
 
 STYLES: dict[str, dict[str, Any]] = {
     "printed": {"color": COLORS[1], "linestyle": (0, (5, 2)), "marker": "x"},
@@ -68,10 +72,10 @@ def plot_against_parameter(
         if len(row) != len(x):
             raise ValueError(f"'{form}' has {len(row)} values for {len(x)} of the parameter; give one for each.")
         y = np.array([value if _drawable(value) else math.nan for value in row], dtype=float)
-        style = STYLES.get(form, {"marker": "."})
+        style, name = STYLES.get(form, {"marker": "."}), _written(form)
         missing = not np.isfinite(y).any()
         # The finest marks on few points only: curves that fall together must both be seen.
-        ax.plot(x, y, markersize=2.6, markevery=max(1, len(x) // 10), label=f"no {form}" if missing else form, **style)
+        ax.plot(x, y, markersize=2.6, markevery=max(1, len(x) // 10), label=f"no {name}" if missing else name, **style)
     ax.set_yscale("log")
     ax.set_xlabel(LABELS.get(xlabel, xlabel))
     ax.set_ylabel(LABELS.get(ylabel, ylabel))
@@ -115,6 +119,8 @@ def plot_conservatism(
 ) -> Axes:
     """Draw by which factor each bound is weaker than what is exact or observed; left of 1 it is violated.
 
+    What is observed is no bound: it is drawn in grey, on the side on which it lies.
+
     Parameters
     ----------
     certified : mapping
@@ -139,35 +145,38 @@ def plot_conservatism(
             raise ValueError(f"the {quantity} has the reference {against}; give the exact or observed value, above 0.")
         for form, value in forms.items():
             row = len(names)
-            names.append(f"{quantity.replace('min_gap', 'gap')}, {form}")
+            names.append(f"{quantity.replace('min_gap', 'gap')}, {_written(form)}")
             if value is None or not _drawable(value):
                 ax.text(1.12, row, "none", va="center", fontsize="small", color="0.4")
                 continue
             factor = value / against if quantity in ("radius", "transient") else against / value
             # Exact forms agree with their reference up to rounding and the search for the supremum.
-            color = COLORS[1] if factor < 1 - 1e-6 else COLORS[0]
+            violated = factor < 1 - 1e-6 and form != "observed"
+            color = "0.5" if form == "observed" else COLORS[1] if violated else COLORS[0]
             ax.plot([1.0, factor], [row, row], color=color, linewidth=1.0)
             ax.plot([factor], [row], marker="o", markersize=4, color=color)
-            side = "left" if factor >= 1 else "right"
             factors.append(factor)
-            text = _number(factor) + ("" if factor >= 1 - 1e-6 else ", violated")
+            # Right of both ends of the stem, where nothing else is.
             ax.annotate(
-                text,
-                (factor, row),
-                (6 if factor >= 1 else -6, 0),
+                _number(factor) + (", violated" if violated else ""),
+                (max(factor, 1.0), row),
+                (6, 0),
                 textcoords="offset points",
-                ha=side,
+                ha="left",
                 va="center",
                 fontsize="small",
             )
     ax.axvline(1.0, color="0.3", linewidth=0.8, zorder=0)
     ax.set_xscale("log")
     # Room for the numbers beside the dots.
-    ax.set_xlim(min(factors) / (1.5 if min(factors) == 1.0 else 30.0), max(factors) * 12.0)
+    span = max(factors) / min(factors)
+    ax.set_xlim(min(factors) / (1.5 * span**0.05), max(factors) * 4.0 * span**0.3)
+    ax.xaxis.set_major_locator(LogLocator(numticks=7))
+    ax.xaxis.set_minor_locator(NullLocator())
     ax.set_yticks(range(len(names)), names)
     ax.set_ylim(len(names) - 0.4, -0.6)
     ax.tick_params(axis="y", length=0)
-    ax.set_xlabel("factor by which the bound is weaker than the reference")
+    ax.set_xlabel("conservatism (factor to the reference)")
     return ax
 
 
@@ -180,7 +189,11 @@ def _number(value: float) -> str:
 
 
 def _drawable(value: float | None) -> bool:
-    return value is not None and math.isfinite(value) and value > 0
+    return value is not None and 0 < value < _LARGEST
+
+
+def _written(form: str) -> str:
+    return form.replace("floquet", "Floquet")
 
 
 def _legend_above(ax: Axes) -> None:

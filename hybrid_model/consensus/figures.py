@@ -17,7 +17,7 @@ from hybrid_model.arc import HybridArc
 from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound
 from hybrid_model.consensus.network import agent_name
 from hybrid_model.consensus.report import edge_norm
-from hybrid_model.consensus.scenario_data import Scenario
+from hybrid_model.consensus.scenario_data import Scenario, Trigger
 from hybrid_model.plots import COLORS, JOURNAL, curve, new_axes, plot_raster
 
 COLUMN = (3.4, 2.5)
@@ -116,8 +116,7 @@ def plot_error_against_threshold(scenario: Scenario, arc: HybridArc, agent: int,
     error = rf"$|\hat{{x}}_{{{agent}}} - x_{{{agent}}}|$"
     ax.plot(times, np.abs(broadcast - x), color=color, label=error)
     grid = np.linspace(0.0, scenario.stop_time, 300)
-    label = r"threshold $c\,e^{-\beta t}$" if scenario.trigger.decay > 0 else "threshold $c$"
-    ax.plot(grid, scenario.trigger.level(grid), color="k", linestyle=(0, (5, 2)), label=label)
+    ax.plot(grid, scenario.trigger.level(grid), color="k", linestyle=(0, (5, 2)), label=_threshold(scenario.trigger))
     events = arc.event_times(f"{name}.trigger.broadcast")
     if events.size:
         reached = np.abs(arc.at(f"{name}.broadcast", events, before=True) - arc.at(f"{name}.x", events))
@@ -125,6 +124,11 @@ def plot_error_against_threshold(scenario: Scenario, arc: HybridArc, agent: int,
     ax.set_ylim(bottom=0.0)
     ax.set_ylabel(f"error of agent {agent}")
     return _over_time(ax, scenario)
+
+
+def _threshold(trigger: Trigger) -> str:
+    decaying = r"\,e^{-\beta t}" if trigger.decay > 0 else ""
+    return f"threshold $c_0 + c_1{decaying}$" if trigger.offset > 0 else f"threshold $c{decaying}$"
 
 
 def plot_broadcasts(scenario: Scenario, event_times: Sequence[npt.ArrayLike], ax: Axes | None = None) -> Axes:

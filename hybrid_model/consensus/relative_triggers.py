@@ -3,8 +3,8 @@
 With ``V = |x - mean(x)|**2/2``, ``e = xhat - x``, ``l_ii = sum_j w_ij`` and
 ``q_i = 1/2 sum_j w_ij (xhat_j - xhat_i)**2`` the consensus protocol gives, for undirected weights that may vary in
 time, ``V' <= -k sum_i (q_i/2 - l_ii e_i**2)`` (audit, section 11.4). Both laws keep ``l_ii e_i**2`` below a share
-of ``q_i/2``. They hear the neighbours' broadcasts and know the weights of their own edges at the present time; nothing is
-measured at the neighbours between events.
+of ``q_i/2``. They hear the neighbours' broadcasts and know the weights of their own edges at the present time; nothing
+is measured at the neighbours between events.
 
 An agent may fire at the very instant of a neighbour's broadcast, which lowers its ``q_i``. It fires at most once at an
 instant: its error is then zero, and both conditions are false with room to spare.
@@ -44,9 +44,9 @@ class RelativeTrigger(NeighbourhoodTrigger):
     """Broadcasts when ``l_ii e_i**2 >= sigma q_i/2 + floor exp(-decay t)``.
 
     The law is ``e_i**2 > sigma/(2 l_ii) q_i`` of X. Yi, K. Liu, D. V. Dimarogonas, K. H. Johansson (arXiv:1704.05434),
-    which carries over to time-varying weights verbatim (audit, section 11.4). Multiplied by ``l_ii`` it is defined while
-    no edge carries weight. At consensus, and while no edge carries weight, it reads ``0 > 0``; the positive floor keeps
-    the closed jump set, which contains the equality, away from there: ``0 >= floor`` is false.
+    which carries over to time-varying weights verbatim (audit, section 11.4). Multiplied by ``l_ii`` it is defined
+    while no edge carries weight. At consensus, and while no edge carries weight, it reads ``0 > 0``; the positive floor
+    keeps the closed jump set, which contains the equality, away from there: ``0 >= floor`` is false.
 
     With the floor ``V' <= -k (1 - sigma)/2 sum_i q_i + k n floor exp(-decay t)``: with a decay the disturbance has the
     finite integral ``k n floor/decay``, and consensus is reached; without, a ball whose radius goes with the floor's

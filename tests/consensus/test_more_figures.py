@@ -25,12 +25,13 @@ from hybrid_model.consensus.figure_sweeps import (
     plot_radius_against,
     plot_rate_against,
 )
-from hybrid_model.consensus.figures import COLUMN
+from hybrid_model.consensus.figures import COLUMN, plot_error_against_threshold
 from hybrid_model.consensus.metrics import run_states
 from hybrid_model.consensus.network import closed_loop, edges_of
 from hybrid_model.consensus.periodic_run import periodic_run
 from hybrid_model.consensus.report import run_report
 from hybrid_model.consensus.scenario import load_scenario
+from hybrid_model.consensus.scenario_data import Trigger, TriggerKind
 from hybrid_model.plots import JOURNAL
 
 
@@ -66,7 +67,7 @@ def test_every_agent_has_axes_with_its_own_broadcasts(run, columns):
         dots = [found for found in ax.lines if found.get_label() == "broadcast"]
         np.testing.assert_array_equal(np.concatenate([dot.get_xdata() for dot in dots] or [[]]), expected)
         assert ax.get_ylim() == figure.axes[0].get_ylim()
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["threshold $c$"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["threshold $c$", "broadcast"]
     plt.close(figure)
 
 
@@ -145,7 +146,7 @@ def test_rate_against_beta_has_the_line_that_parts_slow_from_fast_thresholds(ax)
 
 def test_rate_against_c_has_no_such_line(ax):
     plot_rate_against("c", [0.1, 0.3], {"floquet": [0.47] * 2}, ax)
-    assert labels(ax) == ["floquet"]
+    assert labels(ax) == ["Floquet"]
     assert ax.get_xlabel() == "threshold $c$"
 
 
@@ -173,6 +174,8 @@ def test_conservatism_is_a_factor_and_violations_are_named(ax):
     dots = [float(found.get_xdata()[0]) for found in ax.lines if found.get_marker() == "o"]
     np.testing.assert_allclose(dots, [10.0, 0.5, 10.0, 0.2])
     ax.figure.canvas.draw()
+    label = ax.xaxis.label.get_window_extent()
+    assert ax.figure.bbox.x0 <= label.x0 <= label.x1 <= ax.figure.bbox.x1
     for text in ax.texts:
         box = text.get_window_extent()
         assert ax.get_window_extent().x0 <= box.x0
@@ -182,3 +185,25 @@ def test_conservatism_is_a_factor_and_violations_are_named(ax):
 def test_conservatism_needs_a_reference(ax):
     with pytest.raises(ValueError, match="the rate has the reference None"):
         plot_conservatism({"rate": {"valid": 1.0}}, {}, ax)
+
+
+def test_what_is_observed_is_called_no_bound_however_far_the_factors_reach(ax):
+    """The text stands right of the line, and names at the left stay free, over eight decades."""
+    plot_conservatism({"radius": {"valid": 1e8, "exact": 1.0, "observed": 0.3}}, {"radius": 1.0}, ax)
+    assert [text.get_text() for text in ax.texts][1:] == ["1", "0.3"]
+    ax.figure.canvas.draw()
+    assert all(text.get_window_extent().x0 > ax.transData.transform((1.0, 0.0))[0] for text in ax.texts)
+    assert all(text.get_window_extent().x1 <= ax.figure.bbox.x1 for text in ax.texts)
+
+
+def test_a_bound_that_has_overflown_leaves_the_others_visible(ax):
+    plot_radius_against("beta", [0.0, 0.1], {"exact": [2.0, 3.0], "energy": [4.0, 7e305]}, ax)
+    np.testing.assert_array_equal(line(ax, "energy").get_ydata(), [4.0, np.nan])
+    assert ax.get_ylim()[1] < 10
+
+
+def test_the_threshold_is_written_as_the_trigger_has_it(run, ax):
+    scenario, arc, _ = run
+    mixed = Trigger(TriggerKind.MIXED, threshold=0.4, decay=0.2, offset=0.1)
+    plot_error_against_threshold(replace(scenario, trigger=mixed), arc, 2, ax)
+    assert r"threshold $c_0 + c_1\,e^{-\beta t}$" in labels(ax)

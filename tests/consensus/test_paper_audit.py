@@ -228,7 +228,9 @@ def references(text):
 
 
 def test_references_are_found_however_they_are_written():
-    text = "(audit, section 5.2) audit section 1. audit, sections 3 to 5) (audit, end of section 5.2; audit,\n    section 11"
+    text = (
+        "(audit, section 5.2) audit section 1. audit, sections 3 to 5) audit, end of section 5.2; audit,\n section 11"
+    )
     assert references(text) == ["5.2", "1", "3", "5", "5.2", "11"]
 
 
