@@ -30,8 +30,8 @@ def check_fmu(
     """Check an FMU of FMI 2.0 or 3.0: archive, schemas, semantic rules, symbols and a run.
 
     The archive is refused before anything is written; its XML is parsed without entities and network; binaries are
-    read, not loaded.  Only the run executes the FMU's native code, in a child process with limits: those hold off crashes,
-    hangs and floods, not an attacker.
+    read, not loaded.  Only the run executes the FMU's native code, in a child process with limits: those hold off
+    crashes, hangs and floods, not an attacker.
 
     Parameters
     ----------

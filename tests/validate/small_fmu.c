@@ -1,0 +1,286 @@
+/* A decay x' = -x, y = x, stepped by Euler: both versions, all interface types, and faults by -DFAULT_NAME.
+   No FMI header: the signatures are the standard's, written out for this one machine. */
+#include <math.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#ifndef TOKEN
+#define TOKEN "token"
+#endif
+#define API __attribute__((visibility("default")))
+#define OK 0
+#define ERROR 3
+
+typedef struct {
+    double t, x, rate, memory;
+    int calls, reads;
+} State;
+
+static State* make(const char* token) {
+#ifndef FAULT_TOKEN
+    if (strcmp(token, TOKEN) != 0) return NULL;
+#else
+    (void)token;
+#endif
+#ifdef FAULT_INSTANTIATE
+    return NULL;
+#endif
+    State* s = calloc(1, sizeof *s);
+    s->x = 1.0;
+    s->rate = 1.0;
+#ifdef FAULT_STDOUT
+    printf("hello from the solver\n");
+    fflush(stdout);
+#endif
+#ifdef FAULT_FILE
+    fclose(fopen("solver.log", "w"));
+#endif
+#ifdef FAULT_FORK
+    if (fork() == 0) execlp("sleep", "sleep", "3141592", (char*)NULL);
+    for (;;) pause();
+#endif
+#ifdef FAULT_EXIT
+    exit(0);
+#endif
+#ifdef FAULT_MEMORY
+    for (;;) memset(malloc(1 << 24), 1, 1 << 24);
+#endif
+    return s;
+}
+
+static int get(State* s, unsigned reference, double* value) {
+    switch (reference) {
+        case 0: *value = s->t; return OK;
+        case 1: *value = s->x; return OK;
+        case 2: *value = -s->rate * s->x; return OK;
+        case 3: *value = s->rate; return OK;
+        case 4: *value = s->x - 0.5; return OK;
+        case 5:
+#ifdef FAULT_NAN
+            *value = s->t > 0.3 ? NAN : s->x;
+#elif defined(FAULT_GETTER)
+            *value = s->x + s->reads++;
+#elif defined(FAULT_UNREADABLE)
+            return ERROR;
+#else
+            *value = s->x;
+#endif
+            return OK;
+        default: return ERROR;
+    }
+}
+
+static int set(State* s, unsigned reference, double value) {
+    if (reference == 1) s->x = value;
+    else if (reference == 3) s->rate = value;
+    else return ERROR;
+    return OK;
+}
+
+static int step(State* s, double t, double h) {
+#ifdef FAULT_CRASH
+    if (s->t > 0.3) *(volatile int*)8 = 1;
+#endif
+#ifdef FAULT_ABORT
+    if (s->t > 0.3) abort();
+#endif
+#ifdef FAULT_HANG
+    /* The loop of a solver that asks `t < end` the other way round never ends on NaN. */
+    for (double end = t + h; !(s->t >= end); s->t += 0.01) {}
+#elif !defined(FAULT_ANY_STEP)
+    if (!(h > 0.0)) return ERROR;
+#endif
+    s->x += -s->rate * s->x * h - 1e-9 * s->memory;
+    s->memory += h;
+    s->t = t + h;
+#ifdef FAULT_REPEAT
+    static int calls;
+    s->x += 1e-15 * calls++;
+#endif
+    s->calls++;
+#ifdef FAULT_STATE
+    s->x += 1e-12 * (s->calls % 7);
+#endif
+    return OK;
+}
+
+static void reset(State* s) {
+#ifndef FAULT_RESET
+    s->t = s->memory = 0.0;
+    s->calls = s->reads = 0;
+#endif
+    s->x = 1.0;
+    s->rate = 1.0;
+}
+
+static int copy(State* s, void** out) {
+    *out = malloc(sizeof *s);
+    memcpy(*out, s, sizeof *s);
+    return OK;
+}
+
+static int put_back(State* s, const State* from) {
+#ifdef FAULT_STATE
+    int calls = s->calls;
+    *s = *from;
+    s->calls = calls;
+#else
+    *s = *from;
+#endif
+    return OK;
+}
+
+#ifdef FAULT_SYMBOLS
+API double gamma(double v) { return v; }
+#endif
+#ifdef FAULT_UNDEFINED
+extern void solver_of_the_vendor(void);
+API void fmi3Unused(void) { solver_of_the_vendor(); }
+#endif
+#ifdef FAULT_PYTHON
+extern void Py_Initialize(void);
+extern void* PyLong_FromLong(long);
+API void* fmi3Unused(void) { Py_Initialize(); return PyLong_FromLong(1); }
+#endif
+
+#if FMI == 3
+API const char* fmi3GetVersion(void) { return "3.0"; }
+API void* fmi3InstantiateCoSimulation(const char* name, const char* token) { (void)name; return make(token); }
+API void* fmi3InstantiateModelExchange(const char* name, const char* token) { (void)name; return make(token); }
+API void* fmi3InstantiateScheduledExecution(const char* name, const char* token) { (void)name; return make(token); }
+API void fmi3FreeInstance(State* s) { free(s); }
+API int fmi3EnterInitializationMode(State* s, bool d, double tol, double start) { (void)d; (void)tol; s->t = start; return OK; }
+API int fmi3ExitInitializationMode(State* s) { (void)s; return OK; }
+API int fmi3EnterEventMode(State* s) { (void)s; return OK; }
+API int fmi3EnterStepMode(State* s) { (void)s; return OK; }
+API int fmi3Terminate(State* s) { (void)s; return OK; }
+API int fmi3Reset(State* s) { reset(s); return OK; }
+API int fmi3GetFloat64(State* s, const uint32_t r[], size_t n, double v[], size_t nv) {
+    (void)nv;
+    for (size_t i = 0; i < n; i++) if (get(s, r[i], v + i)) return ERROR;
+    return OK;
+}
+API int fmi3SetFloat64(State* s, const uint32_t r[], size_t n, const double v[], size_t nv) {
+    (void)nv;
+    for (size_t i = 0; i < n; i++) if (set(s, r[i], v[i])) return ERROR;
+    return OK;
+}
+API int fmi3GetClock(State* s, const uint32_t r[], size_t n, bool v[]) {
+    (void)s; (void)r;
+    for (size_t i = 0; i < n; i++) v[i] = false;
+    return OK;
+}
+API int fmi3UpdateDiscreteStates(State* s, bool* again, bool* end, bool* nominals, bool* values, bool* defined, double* next) {
+    (void)s;
+    *again = *end = *nominals = *values = *defined = false;
+    *next = 0.0;
+#ifdef FAULT_ITERATION
+    *again = true;
+#endif
+#ifdef FAULT_NEXT_TIME
+    *defined = true;
+    *next = -1.0;
+#endif
+    return OK;
+}
+API int fmi3DoStep(State* s, double t, double h, bool no, bool* event, bool* end, bool* early, double* last) {
+    (void)no;
+    *event = *end = *early = false;
+    int status = step(s, t, h);
+    *last = s->t;
+#ifdef FAULT_LAST_TIME
+    *last = t + h / 2.0;
+#endif
+#ifdef FAULT_PROGRESS
+    *early = true;
+    *last = s->t = t;
+#endif
+    return status;
+}
+API int fmi3GetFMUState(State* s, void** out) { return copy(s, out); }
+API int fmi3SetFMUState(State* s, void* from) { return put_back(s, from); }
+API int fmi3FreeFMUState(State* s, void** state) { (void)s; free(*state); *state = NULL; return OK; }
+API int fmi3SerializedFMUStateSize(State* s, void* state, size_t* n) { (void)s; (void)state; *n = sizeof(State); return OK; }
+API int fmi3SerializeFMUState(State* s, void* state, uint8_t* out, size_t n) { (void)s; memcpy(out, state, n); return OK; }
+API int fmi3DeserializeFMUState(State* s, const uint8_t* in, size_t n, void** out) {
+    copy(s, out);
+    memcpy(*out, in, n);
+#ifdef FAULT_SERIALIZE
+    ((State*)*out)->x += 1e-9;
+#endif
+    return OK;
+}
+API int fmi3EnterContinuousTimeMode(State* s) { (void)s; return OK; }
+API int fmi3SetTime(State* s, double t) { s->t = t; return OK; }
+API int fmi3SetContinuousStates(State* s, const double x[], size_t n) { (void)n; s->x = x[0]; return OK; }
+API int fmi3GetContinuousStates(State* s, double x[], size_t n) { (void)n; x[0] = s->x; return OK; }
+API int fmi3GetNominalsOfContinuousStates(State* s, double x[], size_t n) { (void)s; (void)n; x[0] = 1.0; return OK; }
+API int fmi3GetContinuousStateDerivatives(State* s, double x[], size_t n) { (void)n; return get(s, 2, x); }
+API int fmi3GetEventIndicators(State* s, double z[], size_t n) { (void)n; z[0] = s->x - 0.5; return OK; }
+API int fmi3GetNumberOfContinuousStates(State* s, size_t* n) { (void)s; *n = 1; return OK; }
+API int fmi3GetNumberOfEventIndicators(State* s, size_t* n) {
+    (void)s;
+    *n = 1;
+#ifdef FAULT_COUNTS
+    *n = 0;
+#endif
+    return OK;
+}
+API int fmi3CompletedIntegratorStep(State* s, bool no, bool* event, bool* end) { (void)s; (void)no; *event = *end = false; return OK; }
+API int fmi3ActivateModelPartition(State* s, uint32_t clock, double t) { (void)clock; s->t = t; s->x *= 0.5; return OK; }
+#else
+API const char* fmi2GetVersion(void) { return "2.0"; }
+API const char* fmi2GetTypesPlatform(void) { return "default"; }
+API void* fmi2Instantiate(const char* name, int kind, const char* token) { (void)name; (void)kind; return make(token); }
+API void fmi2FreeInstance(State* s) { free(s); }
+API int fmi2SetupExperiment(State* s, int d, double tol, double start) { (void)d; (void)tol; s->t = start; return OK; }
+API int fmi2EnterInitializationMode(State* s) { (void)s; return OK; }
+API int fmi2ExitInitializationMode(State* s) { (void)s; return OK; }
+API int fmi2EnterEventMode(State* s) { (void)s; return OK; }
+API int fmi2EnterContinuousTimeMode(State* s) { (void)s; return OK; }
+API int fmi2Terminate(State* s) { (void)s; return OK; }
+API int fmi2Reset(State* s) { reset(s); return OK; }
+API int fmi2GetReal(State* s, const unsigned r[], size_t n, double v[]) {
+    for (size_t i = 0; i < n; i++) if (get(s, r[i], v + i)) return ERROR;
+    return OK;
+}
+API int fmi2SetReal(State* s, const unsigned r[], size_t n, const double v[]) {
+    for (size_t i = 0; i < n; i++) if (set(s, r[i], v[i])) return ERROR;
+    return OK;
+}
+typedef struct { int again, end, nominals, values, defined; double next; } Info;
+API int fmi2NewDiscreteStates(State* s, Info* info) {
+    (void)s;
+    memset(info, 0, sizeof *info);
+#ifdef FAULT_ITERATION
+    info->again = 1;
+#endif
+    return OK;
+}
+API int fmi2DoStep(State* s, double t, double h, int no) {
+    (void)no;
+#ifdef FAULT_DISCARD
+    if (t > 0.3) return 2;
+#endif
+    return step(s, t, h);
+}
+API int fmi2GetRealStatus(State* s, int kind, double* v) { (void)kind; *v = s->t; return OK; }
+API int fmi2GetBooleanStatus(State* s, int kind, int* v) { (void)s; (void)kind; *v = 1; return OK; }
+API int fmi2GetFMUstate(State* s, void** out) { return copy(s, out); }
+API int fmi2SetFMUstate(State* s, void* from) { return put_back(s, from); }
+API int fmi2FreeFMUstate(State* s, void** state) { (void)s; free(*state); *state = NULL; return OK; }
+API int fmi2SerializedFMUstateSize(State* s, void* state, size_t* n) { (void)s; (void)state; *n = sizeof(State); return OK; }
+API int fmi2SerializeFMUstate(State* s, void* state, char* out, size_t n) { (void)s; memcpy(out, state, n); return OK; }
+API int fmi2DeSerializeFMUstate(State* s, const char* in, size_t n, void** out) { copy(s, out); memcpy(*out, in, n); return OK; }
+API int fmi2SetTime(State* s, double t) { s->t = t; return OK; }
+API int fmi2SetContinuousStates(State* s, const double x[], size_t n) { (void)n; s->x = x[0]; return OK; }
+API int fmi2GetContinuousStates(State* s, double x[], size_t n) { (void)n; x[0] = s->x; return OK; }
+API int fmi2GetNominalsOfContinuousStates(State* s, double x[], size_t n) { (void)s; (void)n; x[0] = 1.0; return OK; }
+API int fmi2GetDerivatives(State* s, double x[], size_t n) { (void)n; return get(s, 2, x); }
+API int fmi2GetEventIndicators(State* s, double z[], size_t n) { (void)n; z[0] = s->x - 0.5; return OK; }
+API int fmi2CompletedIntegratorStep(State* s, int no, int* event, int* end) { (void)s; (void)no; *event = *end = 0; return OK; }
+#endif
