@@ -72,7 +72,7 @@ class Kin:
             return self._alike_attributes(a, b, compare)
         if isinstance(a, Variable):
             return a.shape == b.shape and all(compare(getattr(a, name), getattr(b, name)) for name in self._visible(a))
-        if is_dataclass(a) and _is_frozen(type(a)):
+        if is_dataclass(a) and hasattr(a, "__dict__") and _is_frozen(type(a)):
             return compare(vars(a), vars(b))
         return False
 
@@ -169,8 +169,10 @@ class _WatchedVariable(Variable):
     """A variable of which it is noted whether maps look at more than its name, kind, shape and flags."""
 
     def __getattribute__(self, name: str) -> Any:
-        if name in (*_UNSEEN, _EVERYTHING) and sys._getframe(1).f_code.co_name not in _SHAPE:
-            _note(self, name)
+        if name in (*_UNSEEN, _EVERYTHING):
+            caller = sys._getframe(1)
+            if caller.f_code.co_name not in _SHAPE or caller.f_globals.get("__name__") != Variable.__module__:
+                _note(self, name)
         return super().__getattribute__(name)
 
 
