@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 
@@ -73,28 +74,37 @@ def require_known_times(
         See `fmu.trace.trace`.
     """
     for number, member in enumerate(members.members):
-        group = groups[group_of[number]]
-        for what, uses in _restricted(group):
-            inputs = patterns.of_inputs(number, uses["u"])
-            forbidden = uses["t"] or uses["x"] or uses["changes"] or patterns.outside(inputs, time=what == "time")
-            if forbidden:
-                # The part says it best, if it is its own doing.
+        for use in _uses(groups[group_of[number]]):
+            if use.own:
+                # The part itself says what is wrong with it.
                 trace(member.automaton)
+            if patterns.outside(patterns.of_inputs(number, use.inputs), time=use.is_time):
                 raise TraceError(
-                    f"{composition.name}: the time of an event of {member.path}, or one of its internal events, "
-                    "depends over a wire on more than parameters and discrete states: use a jump set, or wire a sample."
+                    f"{composition.name}: an event of {member.path} ({use.event}) depends, by its inputs, on the time, "
+                    "a continuous state or an input of the whole: a known time, and a breakpoint that nobody sees, comes from "
+                    "parameters and discrete states; use a jump set otherwise."
                 )
 
 
-def _restricted(group: Group) -> list[tuple[str, dict[str, list[int]]]]:
-    jumps = group.traced.automaton.jumps
+@dataclass(frozen=True)
+class _Use:
+    """What the time of a time event, or an internal event, makes use of."""
+
+    event: str
+    is_time: bool
+    own: bool
+    inputs: list[int]
+
+
+def _uses(group: Group) -> list[_Use]:
     found = []
-    if any(info.trigger is Trigger.TIME for info in jumps):
-        found.append(("time", {name: group.columns("times", 0, k) for name, k in (("t", 0), ("x", 1), ("u", 3))}))
-        found[-1][1]["changes"] = []
-    for k, info in enumerate(jumps):
+    place = 0
+    for k, info in enumerate(group.traced.automaton.jumps):
+        if info.trigger is Trigger.TIME:
+            t, x, u = (group.rows("times", 0, argument)[place] for argument in (0, 1, 3))
+            found.append(_Use(info.name, True, bool(t or x), list(u)))
+            place += 1
         if info.internal:
-            uses = {name: group.columns(f"reset{k}", 1, at) for name, at in (("x", 1), ("u", 3))}
-            changes = [0] if group.changes(f"reset{k}", Kind.STATE) else []
-            found.append(("internal", {"t": [], "changes": changes, **uses}))
+            own = group.changes(f"reset{k}", Kind.STATE) or bool(group.columns(f"reset{k}", 1, 1))
+            found.append(_Use(info.name, False, own, group.columns(f"reset{k}", 1, 3)))
     return found
