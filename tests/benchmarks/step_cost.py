@@ -2,8 +2,8 @@
 
 ``PYTHONPATH=tests python -m benchmarks.step_cost`` prints the tables. The driver (``step_cost*.c``) is compiled first;
 what it compares with is built by the packages pythonfmu and pythonfmu3 of the extra ``benchmark``. Its contenders take
-turns, so that what disturbs one disturbs all; ratios are the medians of the ratios of each round. Times are in ns a
-call, the least and the median of the rounds.
+turns, so that what disturbs one disturbs all. Times are in ns a call, the least and the median of the rounds; ratios
+are those of the least, which other work on the machine changes little.
 """
 
 import argparse
@@ -250,8 +250,8 @@ def impact_errors(values):
 
 
 def ratio(measured, base, what):
-    """Median of the ratios of the rounds to those of `base`."""
-    return statistics.median(a / b for a, b in zip(measured.times[what], base.times[what], strict=True))
+    """Ratio of the least times: a round that is interrupted says more of the machine than of the contender."""
+    return min(measured.times[what]) / min(base.times[what])
 
 
 def cost(times):
