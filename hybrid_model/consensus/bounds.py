@@ -180,9 +180,10 @@ class Bounds:
     @property
     def exact_radius(self) -> float | None:
         """See `hybrid_model.consensus.worst_case`."""
-        return self._sum(self._exact_part)
+        return self._sum(self.exact_part)
 
-    def _exact_part(self, decay: float) -> float | None:
+    def exact_part(self, decay: float) -> float | None:
+        """The exact radius for the threshold ``exp(-decay t)``; None if it does not exist."""
         worst = self._worst(decay)
         return None if worst is None else worst.radius
 

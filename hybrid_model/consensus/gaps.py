@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from scipy.special import lambertw
 
 from hybrid_model.consensus.analysis import Analysis
+from hybrid_model.consensus.carriers import Carrier, RippleCarrier, SineCarrier, UnitCarrier, WeightMap
 from hybrid_model.consensus.edge_weights import EdgeWeights
-from hybrid_model.consensus.scenario_data import WeightKind
+from hybrid_model.consensus.table_weights import LinearCarrier
 
 __all__ = ["excited_gap", "frozen_gap", "growing_gap", "printed_gap"]
 
 _ACCURACY = 1e-5
-_GRID = 4
-_FINE = 4001
-_CORNERED = (WeightKind.CONSTANT, WeightKind.GATED_SINE)
-"""Weights whose integral over a moving interval is largest at or beside their breakpoints."""
+_FINE = 4000
+_RISE = 1e-4
+"""Share of the integral by which the bound between two starts may exceed what is found at the starts."""
 
 
 def printed_gap(threshold: float, decay: float, speed: float, kappa1: float, kappa2: float) -> float:
@@ -87,9 +87,10 @@ def excited_gap(
     """
     network, weights = analysis.scenario.network, analysis.scenario.edge_weights
     rates = np.array([speed if agent in edge else 0.0 for edge, speed in zip(network.edges, speeds, strict=True)])
+    steepest = _steepest(analysis, rates)
 
     def is_safe(gap: float) -> bool:
-        return _moved(weights, rates, analysis, gap) < threshold * math.exp(-decay * gap)
+        return _moved(weights, rates, analysis, gap, steepest) < threshold * math.exp(-decay * gap)
 
     if is_safe(high):
         return high
@@ -99,37 +100,55 @@ def excited_gap(
     return low
 
 
-def _moved(weights: EdgeWeights, rates: NDArray[np.float64], analysis: Analysis, length: float) -> float:
-    """Supremum over the starts t1 of ``sum rates*int_{t1}^{t1+length} w``."""
+def _moved(
+    weights: EdgeWeights, rates: NDArray[np.float64], analysis: Analysis, length: float, steepest: float | None
+) -> float:
+    """Supremum over the starts t1 of ``sum rates*int_{t1}^{t1+length} w``, never too small.
+
+    Between two starts h apart, with no corner of a weight between them, the sum rises above the larger of its end
+    values by at most ``h^2/8`` times the bound of its second derivative, which is twice that of the slope of the
+    weights.
+    """
     cycle = analysis.cycle
     last = cycle if analysis.is_periodic else max(cycle - length, 0.0)
     corners = np.concatenate(
         ([0.0, last], weights.breakpoints(0.0, last), weights.breakpoints(length, last + length) - length)
     )
     corners = np.unique(np.clip(corners, 0.0, last))
-    steps = np.arange(_GRID) / _GRID
-    starts = np.append((corners[:-1, None] + np.diff(corners)[:, None] * steps).ravel(), last)
-    values = weights.integral(starts, starts + length) @ rates
-    # Between two starts the integral follows a parabola: the vertex through the best three lies above the grid.
-    best = int(np.argmax(values))
-    around = slice(max(best - 1, 0), min(best + 2, len(values)))
-    largest = float(values[best] + _vertex_rise(starts[around], values[around]))
-    if analysis.scenario.weights.kind in _CORNERED:
+    largest = float(np.max(weights.integral(corners, corners + length) @ rates))
+    if steepest == 0.0 or len(corners) == 1:
         return largest
-    # Between the corners of other kinds anything may happen: a fine grid, and the most that lies between its points.
-    starts = np.unique(np.append(np.linspace(0.0, last, _FINE), corners))
-    steepest = float(rates @ analysis.largest_weights)
-    between = 0.5 * steepest * float(np.max(np.diff(starts), initial=0.0))
-    return max(largest, float(np.max(weights.integral(starts, starts + length) @ rates)) + between)
+    if steepest is None:
+        # Nothing is known of the slope: the sum itself changes no faster than the largest weights say.
+        starts = np.unique(np.append(np.linspace(0.0, last, _FINE), corners))
+        between = 0.5 * float(rates @ analysis.largest_weights) * float(np.max(np.diff(starts)))
+        return float(np.max(weights.integral(starts, starts + length) @ rates)) + between
+    step = max(math.sqrt(4 * _RISE * largest / steepest), last / _FINE)
+    counts = np.ceil(np.diff(corners) / step).astype(int)
+    inner = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(corners[:-1], corners[1:], counts, strict=True)]
+    starts = np.append(np.concatenate(inner), last)
+    rise = steepest / 4 * float(np.max(np.diff(starts))) ** 2
+    return float(np.max(weights.integral(starts, starts + length) @ rates)) + rise
 
 
-def _vertex_rise(t: NDArray[np.float64], y: NDArray[np.float64]) -> float:
-    """How far the parabola through three points rises above the largest of them; 0.0 if it does not."""
-    if len(t) < 3 or np.min(np.diff(t)) <= 0:
+def _steepest(analysis: Analysis, rates: NDArray[np.float64]) -> float | None:
+    """Bound on ``|sum rates*w'|`` between the corners of the weights; None if a carrier's slope is not known."""
+    pieces = analysis.scenario.edge_weights.pieces(0.0, analysis.cycle)
+    amplitudes = np.max([piece.amplitudes for piece in pieces], axis=0)
+    slopes = [_slope(carrier) for carrier in analysis.scenario.edge_weights.carriers]
+    if any(slope is None for slope in slopes):
+        return None
+    return float(np.sum(rates * amplitudes * np.array(slopes, dtype=float)))
+
+
+def _slope(carrier: Carrier) -> float | None:
+    """Bound on the slope [1/s] of a carrier between the breakpoints of its weight; None if it is not known."""
+    if isinstance(carrier, UnitCarrier):
         return 0.0
-    left, right = (y[1] - y[0]) / (t[1] - t[0]), (y[2] - y[1]) / (t[2] - t[1])
-    bend = (right - left) / (t[2] - t[0])
-    if bend >= 0:
-        return 0.0
-    slope = left + bend * (t[1] - t[0])
-    return float(max(0.0, -(slope**2) / (4 * bend)))
+    if isinstance(carrier, SineCarrier):
+        return (4.0 if carrier.map is WeightMap.SQUARE else 2.0) * carrier.rate
+    if isinstance(carrier, RippleCarrier):
+        return carrier.depth * carrier.rate
+    if isinstance(carrier, LinearCarrier):
+        return float(np.max(np.abs(carrier.slopes)))
+    return None
