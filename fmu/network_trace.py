@@ -81,8 +81,8 @@ def require_known_times(
             if patterns.outside(patterns.of_inputs(number, use.inputs), time=use.is_time):
                 raise TraceError(
                     f"{composition.name}: an event of {member.path} ({use.event}) depends, by its inputs, on the time, "
-                    "a continuous state or an input of the whole: a known time, and a breakpoint that nobody sees, comes from "
-                    "parameters and discrete states; use a jump set otherwise."
+                    "a continuous state or an input of the whole: known times, and breakpoints that nobody sees, come "
+                    "from parameters and discrete states; use a jump set otherwise."
                 )
 
 
