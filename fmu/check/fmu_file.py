@@ -18,7 +18,7 @@ from fmu.check.rules_interfaces import interface_findings
 from fmu.check.rules_structure import structure_findings
 from fmu.check.rules_variables import variable_findings
 from fmu.check.smoke import RunLimits, run_fmu
-from fmu.check.xml_file import XmlError, parse, schema_findings
+from fmu.check.xml_file import XmlError, parse, require_size, schema_findings
 
 SAFETY = "FMI 3.0.2 section 2.5: ZIP with store or deflate, no encryption, '/' between folders"
 _SCHEMAS = {2: "fmi2/fmi2ModelDescription.xsd", 3: "fmi3/fmi3ModelDescription.xsd"}
@@ -64,8 +64,9 @@ def check_fmu(
 
 
 def _check(archive: Archive, report: Report, run_limits: RunLimits | None) -> None:
-    content = archive.read(DESCRIPTION)
     try:
+        require_size(archive.size(DESCRIPTION), DESCRIPTION)
+        content = archive.read(DESCRIPTION)
         root = parse(content, DESCRIPTION)
     except XmlError as refused:
         report.extend([refused.finding])

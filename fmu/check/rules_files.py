@@ -10,7 +10,7 @@ from fmu.check.archive import Archive, ArchiveError
 from fmu.check.description import Description
 from fmu.check.findings import Finding, error, note, quoted, warning
 from fmu.check.platforms import parts_of
-from fmu.check.xml_file import XmlError, parse, schema_findings
+from fmu.check.xml_file import XmlError, parse, require_size, schema_findings
 
 SOURCES = "FMI 2.0.4 section 2.3; FMI 3.0.2 section 2.5.1.4"
 TERMINALS = "FMI 3.0.2 section 2.4.9"
@@ -40,6 +40,7 @@ def file_findings(archive: Archive, description: Description) -> Iterator[Findin
 def _checked(archive: Archive, name: str, schema: str) -> tuple[etree._Element | None, list[Finding]]:
     """Return a file's tree if it is sound, and what is wrong with it."""
     try:
+        require_size(archive.size(name), name)
         root = parse(archive.read(name), name)
     except XmlError as problem:
         return None, [problem.finding]

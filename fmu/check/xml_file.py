@@ -16,7 +16,7 @@ from xml.parsers import expat
 
 from lxml import etree
 
-from fmu.check.findings import Finding, error, quoted
+from fmu.check.findings import Finding, error
 
 STANDARD = "FMI 2.0.4 section 2.2; FMI 3.0.2 section 2.4"
 
@@ -67,8 +67,7 @@ def parse(content: bytes, name: str, limits: XmlLimits = LIMITS) -> etree._Eleme
     XmlError
         If the file is too large, not UTF-8, not well-formed, too deep, or has a document type.
     """
-    if len(content) > limits.size:
-        raise _refused("size", f"{name} has {len(content)} bytes; at most {limits.size} are accepted.")
+    require_size(len(content), name, limits)
     _require_utf8(content, name)
     _scan(content, name, limits)
     parser = etree.XMLParser(
@@ -85,6 +84,18 @@ def parse(content: bytes, name: str, limits: XmlLimits = LIMITS) -> etree._Eleme
     except (etree.XMLSyntaxError, ValueError) as problem:
         raise _refused("syntax", f"{name} is not well-formed XML: {problem}.") from problem
     return root
+
+
+def require_size(size: int, name: str, limits: XmlLimits = LIMITS) -> None:
+    """Refuse an XML file by its size in bytes, best before it is read.
+
+    Raises
+    ------
+    XmlError
+        If it is too large.
+    """
+    if size > limits.size:
+        raise _refused("size", f"{name} has {size} bytes; at most {limits.size} are accepted.")
 
 
 def _refused(rule: str, message: str) -> XmlError:
@@ -173,7 +184,7 @@ def schema_findings(root: etree._Element, name: str, schema: str) -> list[Findin
     validator = _schema(schema)
     if validator.validate(root):
         return []
-    messages = [quoted(entry.message, 400)[1:-1] + f" ({name}, line {entry.line})" for entry in validator.error_log]
+    messages = [f"{entry.message[:400]} ({name}, line {entry.line})" for entry in validator.error_log]
     reference = f"{Path(schema).name} of the standard"
     return [error("schema.valid", f"{message}", reference) for message in messages] or [
         error("schema.valid", f"{name} does not fit the schema.", reference)

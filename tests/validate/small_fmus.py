@@ -107,9 +107,9 @@ def binary(major, *flags):
         return output.read_bytes()
 
 
-def write(path, members):
+def write(path, members, method=zipfile.ZIP_DEFLATED):
     """Write an archive of members by name."""
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(path, "w", method) as archive:
         for name, content in members.items():
             archive.writestr(name, content)
     return path
