@@ -56,7 +56,9 @@ def _dependencies(description: Description, name: str, unknown: Unknown, variabl
                 STRUCTURE,
             )
         elif not _is_known(description, name, source):
-            yield error(
+            # Without state derivatives, as co-simulation may be, it may be a state that is not listed.
+            hidden = not description.structure["derivatives"] and source.variability == "continuous"
+            yield (warning if hidden and "ModelExchange" not in description.interfaces else error)(
                 "structure.dependency",
                 f"The dependencies of {where} name {quoted(source.name)}, a {source.variability} "
                 f"{source.causality} variable, "
