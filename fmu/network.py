@@ -75,7 +75,7 @@ class NetworkTrace:
         Parameters
         ----------
         result : str
-            ``"flow"``, ``"outputs"``, ``"margins"``, ``"times"``, ``"start_x"`` or ``"start_z"``.
+            ``"flow"``, ``"flow_set"``, ``"margins"``, ``"times"``, ``"outputs"``, ``"start_x"`` or ``"start_z"``.
         argument : str
             ``"t"``, ``"x"``, ``"z"``, ``"u"`` or ``"p"``.
 
@@ -84,6 +84,26 @@ class NetworkTrace:
         csr_array of bool, shape (elements of the result, elements of the argument)
         """
         return self.patterns.matrix(result, argument)
+
+    def changed_by(self, kind: Kind) -> list[frozenset[int]]:
+        """Return for each continuous or discrete state the jumps that may change it.
+
+        Parameters
+        ----------
+        kind : Kind
+            ``Kind.STATE`` or ``Kind.DISCRETE``.
+
+        Returns
+        -------
+        list of frozenset of int
+            For each element of the vector numbers of jumps.
+        """
+        found: list[frozenset[int]] = [frozenset()] * self.layout.sizes[kind]
+        for member, number in zip(self.members.members, self.group_of, strict=True):
+            changes = self.groups[number].changed_by(kind)
+            for element, jumps in zip(member.places(kind), changes, strict=True):
+                found[element] = frozenset(member.jump + jump for jump in jumps)
+        return found
 
     def c_code(self) -> str:
         """Return C99 that defines the functions of fmu/runtime/model.h.

@@ -36,7 +36,7 @@ class NetworkPattern:
         self._banks: list[list[Dependencies]] | None = None
 
     def matrix(self, result: str, argument: str) -> scipy.sparse.csr_array:
-        """Return the pattern of a result, ``"flow"``, ``"outputs"``, ``"times"``, ``"start_x"`` or ``"start_z"``.
+        """Return the pattern of a result: see `fmu.network.NetworkTrace.pattern`.
 
         Returns
         -------
@@ -122,7 +122,19 @@ class NetworkPattern:
 
     def _result(self, name: str) -> list[Dependencies]:
         banks = self._given()
+        if name == "flow_set":
+            return [self._flow_set(banks)]
         return [row for number in range(len(self._members.members)) for row in self._rows(number, name, 0, banks)]
+
+    def _flow_set(self, banks: list[list[Dependencies]]) -> Dependencies:
+        """The flow set of the network is the intersection of those of the parts."""
+        rows = (
+            row
+            for number, member in enumerate(self._members.members)
+            if member.automaton.has_flow_set
+            for row in self._rows(number, "flow_set", 0, banks)
+        )
+        return frozenset[int]().union(*rows)
 
     def _start(self) -> tuple[list[Dependencies], list[Dependencies]]:
         banks = self._identity()

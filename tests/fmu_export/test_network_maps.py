@@ -319,6 +319,7 @@ def test_patterns_are_those_of_the_whole(network):
     whole = trace(composition)
     results = {
         "flow": (whole.flow, 0),
+        **({"flow_set": (whole.flow_set, 0)} if composition.has_flow_set else {}),
         "outputs": (whole.outputs, 0),
         "margins": (whole.margins, 0),
         "times": (whole.times, 0),
@@ -332,6 +333,20 @@ def test_patterns_are_those_of_the_whole(network):
             if rows and columns:
                 expected = ca.DM(function.jac_sparsity(number, argument), 1).full().astype(bool)
             np.testing.assert_array_equal(traced.pattern(name, letter).toarray(), expected)
+
+
+def test_jumps_change_what_they_change_in_the_whole(network):
+    composition, traced, _ = network
+    whole = trace(composition)
+    for number, kind in enumerate((Kind.STATE, Kind.DISCRETE)):
+        expected = [set() for _ in range(traced.layout.sizes[kind])]
+        for jump, reset in enumerate(whole.resets):
+            arguments = reset.sx_in()
+            new, old = reset.call(arguments)[number], arguments[1 + number]
+            for element in range(old.numel()):
+                if not ca.is_equal(new[element], old[element], 2):
+                    expected[element].add(jump)
+        assert traced.changed_by(kind) == expected
 
 
 def test_a_thousand_parts_in_little_code(tmp_path):
