@@ -90,10 +90,15 @@ def excited_gap(
     steepest = _steepest(analysis, rates)
 
     def is_safe(gap: float) -> bool:
-        return _moved(weights, rates, analysis, gap, steepest) < threshold * math.exp(-decay * gap)
+        level = threshold * math.exp(-decay * gap)
+        return _moved(weights, rates, analysis, gap, steepest, level) < level
 
     if is_safe(high):
         return high
+    # Most gaps are far below the longest of interest.
+    while 2 * low < high and is_safe(2 * low):
+        low *= 2
+    high = min(high, 2 * low)
     while high - low > _ACCURACY * low:
         middle = (low + high) / 2
         low, high = (middle, high) if is_safe(middle) else (low, middle)
@@ -101,9 +106,14 @@ def excited_gap(
 
 
 def _moved(
-    weights: EdgeWeights, rates: NDArray[np.float64], analysis: Analysis, length: float, steepest: float | None
+    weights: EdgeWeights,
+    rates: NDArray[np.float64],
+    analysis: Analysis,
+    length: float,
+    steepest: float | None,
+    level: float,
 ) -> float:
-    """Supremum over the starts t1 of ``sum rates*int_{t1}^{t1+length} w``, never too small.
+    """Supremum over the starts t1 of ``sum rates*int_{t1}^{t1+length} w``, never too small; or a value above `level`.
 
     Between two starts h apart, with no corner of a weight between them, the sum rises above the larger of its end
     values by at most ``h^2/8`` times the bound of its second derivative, which is twice that of the slope of the
@@ -116,7 +126,7 @@ def _moved(
     )
     corners = np.unique(np.clip(corners, 0.0, last))
     largest = float(np.max(weights.integral(corners, corners + length) @ rates))
-    if steepest == 0.0 or len(corners) == 1:
+    if largest >= level or steepest == 0.0 or len(corners) == 1:
         return largest
     if steepest is None:
         # Nothing is known of the slope: the sum itself changes no faster than the largest weights say.
