@@ -13,7 +13,7 @@ import shutil
 import tempfile
 import threading
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fmu.compiler import Task, compiler_identity, find_compiler, is_zig, run_all, zig_compiler
@@ -53,15 +53,21 @@ _objects: dict[str, bytes] = {}
 _objects_lock = threading.Lock()
 
 
-def runtime_sources() -> list[Path]:
-    """Return the runtime's C files, sorted by name.
+def runtime_sources(fmi: str = "3.0") -> list[Path]:
+    """Return the runtime's C files for one version of the standard, sorted by name.
+
+    Parameters
+    ----------
+    fmi : {"2.0", "3.0"}
+        Version whose functions the library is to have.
 
     Returns
     -------
     list of Path
         To be compiled together with the generated ``model.c``.
     """
-    return sorted(RUNTIME.glob("*.c"))
+    other = "fmi3" if fmi == "2.0" else "fmi2"
+    return [source for source in sorted(RUNTIME.glob("*.c")) if not source.name.startswith(other)]
 
 
 def fmi_headers() -> Path:
@@ -228,7 +234,9 @@ def _build(
                 objects.append(_object(source, include_dirs, toolchain, folder, identity + headers))
         _compile(objects, scratch, progress)
         if progress is not None:
-            progress(f"linking for {', '.join(platform.name for platform in platforms)}")
+            # It compiles the C library of Windows, and keeps it.
+            hint = " (minutes, the first time)" if any(platform.system == "windows" for platform in platforms) else ""
+            progress(f"linking for {', '.join(platform.name for platform in platforms)}{hint}")
         links = [_link(toolchain, platform, sources, scratch) for platform, toolchain in toolchains.items()]
         run_all(links, scratch, progress)
         return {platform: _library(toolchain, platform, scratch) for platform, toolchain in toolchains.items()}
@@ -267,7 +275,9 @@ def _compile(objects: Sequence[_Object], scratch: Path, progress: Callable[[str]
     missing = [entry for entry in objects if entry.key not in known]
     if progress is not None:
         progress(f"compiling {len(missing)} of {len(objects)} C files")
-    run_all([entry.task for entry in missing], scratch)
+    last = {entry.task.folder: entry.file for entry in missing}
+    labels = {file: f"compiled for {folder.name}" for folder, file in last.items()}
+    run_all([replace(entry.task, label=labels.get(entry.file, "")) for entry in missing], scratch, progress)
     for entry in objects:
         if entry.key in known:
             entry.file.write_bytes(known[entry.key])

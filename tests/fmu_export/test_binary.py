@@ -11,7 +11,7 @@ import zipfile
 import pytest
 from catalogue import cases
 
-from fmu.build import find_compiler, fmi_headers, runtime_sources
+from fmu.build import RUNTIME, find_compiler, fmi_headers
 from fmu.export import Fmi, export_fmu
 from hybrid_model.models import BouncingBall
 
@@ -85,7 +85,7 @@ def test_is_as_hardened_systems_want_it(fmi, binary):
 @needs_tools
 def test_the_runtime_has_no_writable_globals(tmp_path):
     """Two instances share nothing: no object file of the runtime has data that can be written."""
-    for source in runtime_sources():
+    for source in RUNTIME.glob("*.c"):
         target = tmp_path / f"{source.stem}.o"
         # Without position independence, tables of pointers are constants for nm as well.
         flags = ["-std=c99", "-O2", "-fno-pic", "-fno-pie", "-c", f"-I{fmi_headers()}", str(source), "-o", str(target)]
@@ -116,7 +116,7 @@ def test_functions_of_the_host_do_not_replace_its_own(fmi, binary, tmp_path):
 
 def _internal_names():
     """Functions that one file of the runtime calls in another."""
-    text = "".join(source.with_suffix(suffix).read_text() for source in runtime_sources() for suffix in (".c",))
+    text = "".join(source.read_text() for source in RUNTIME.glob("*.c"))
     return set(re.findall(r"^(?:\w+ )+\*?(\w+)\([^;]*\)\n\{", text, re.MULTILINE)) - set(re.findall(r"fmi\w+", text))
 
 
