@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import fmu.build
+import fmu.libraries
 from fmu.build import (
     BuildError,
     binaries,
@@ -77,7 +78,7 @@ def compiled(log: Path) -> list[str]:
 
 @posix
 def test_the_runtime_is_compiled_once_a_process(logged, tmp_path, monkeypatch):
-    monkeypatch.setattr(fmu.build, "_objects", {})
+    monkeypatch.setattr(fmu.libraries, "_objects", {})
     sources = runtime_sources()
     for k in range(3):
         source = tmp_path / str(k) / "model.c"
@@ -100,8 +101,8 @@ def test_kept_objects_are_those_of_the_same_build(change, logged, tmp_path, monk
         '#include "fmi3Functions.h"\n#include "value.h"\nconst char *fmi3GetVersion(void) { return "v" + VALUE; }\n'
     )
     monkeypatch.setattr(fmu.build, "RUNTIME", runtime)
-    monkeypatch.setattr(fmu.build, "_objects", {})
-    monkeypatch.setattr(fmu.build, "STRICT_FLAGS", ())
+    monkeypatch.setattr(fmu.libraries, "_objects", {})
+    monkeypatch.setattr(fmu.libraries, "STRICT_FLAGS", ())
     compile_fmu([runtime / "version.c"], [fmi_headers()], tmp_path / "One.so")
     if change == "source":
         (runtime / "version.c").write_text(
@@ -110,7 +111,7 @@ def test_kept_objects_are_those_of_the_same_build(change, logged, tmp_path, monk
     elif change == "header":
         (runtime / "value.h").write_text("#define VALUE 0\n")
     elif change == "flags":
-        monkeypatch.setattr(fmu.build, "COMMON_FLAGS", (*fmu.build.COMMON_FLAGS, "-fno-builtin"))
+        monkeypatch.setattr(fmu.libraries, "COMMON_FLAGS", (*fmu.libraries.COMMON_FLAGS, "-fno-builtin"))
     elif change == "compiler":
         script = Path(os.environ["CC"])
         script.write_text(script.read_text() + "# another version\n")

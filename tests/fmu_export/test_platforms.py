@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 import fmu.build
+import fmu.libraries
 from fmu.build import BuildError, compile_fmu, fmi_headers
 from fmu.check.binary import read_binary
 from fmu.compiler import cache_folder, is_zig
@@ -264,7 +265,7 @@ def test_hiding_names_keeps_a_library_of_macos_whole(platform, tmp_path, monkeyp
     """The linker's own hashes come out again, so the signature is understood; what is hidden is gone, nothing else."""
     (tmp_path / "model.c").write_text(VERSION)
     with monkeypatch.context() as patch:
-        patch.setattr(fmu.build, "export_only", lambda library, prefix: library)
+        patch.setattr(fmu.libraries, "export_only", lambda library, prefix: library)
         raw = compile_fmu([tmp_path / "model.c"], [fmi_headers()], tmp_path / "raw", platform=platform).read_bytes()
     assert export_only(raw, "_") == raw
     hidden = export_only(raw, "_fmi")
