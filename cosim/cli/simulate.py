@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import hybrid_model as hm
-from cosim.cli.exits import exit_of, write_csv
+from cosim.cli.exits import UsageError, exit_of, write_csv
 from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
 from cosim.masters.start import require_times
@@ -22,6 +22,9 @@ from hybrid_model.consensus.scenario_data import Scenario
 
 AUTOMATON_AGENTS = 8
 """Up to this many agents `auto` runs the closed loop as one automaton; beyond, event by event over the network."""
+
+MOST_POINTS = 1e7
+"""Of a trajectory; one that is longer fills the memory."""
 
 
 def add_parser(commands: Any) -> None:
@@ -47,6 +50,7 @@ def run(options: argparse.Namespace) -> int:
     require_times(0.0, scenario.stop_time, options.output_interval, "output interval")
     if options.stop_time is not None:
         scenario = dataclasses.replace(scenario, stop_time=options.stop_time)
+    _require_points(scenario.stop_time, options.output_interval)
     one = options.engine == "automaton" or (options.engine == "auto" and scenario.network.agents <= AUTOMATON_AGENTS)
     report, times, signals = (_as_one if one else _as_network)(scenario, options.output_interval)
     document = json.dumps({"scenario": scenario.name, **report.as_dict(), "message": report.message}, indent=2)
@@ -56,6 +60,14 @@ def run(options: argparse.Namespace) -> int:
         write_csv(options.out / "trajectory.csv", times, signals)
     print(document if options.json else _text(scenario, report))
     return exit_of(report.stop)
+
+
+def _require_points(stop_time: float, interval: float) -> None:
+    if stop_time / interval > MOST_POINTS:
+        raise UsageError(
+            f"--output-interval {interval:g} makes more than {MOST_POINTS:.0g} points up to {stop_time:g} s; "
+            "choose a longer one."
+        )
 
 
 def _as_one(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[str, Any]]:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.carriers import Carrier
 from hybrid_model.consensus.gating import gate_boundary, gate_segment
-from hybrid_model.consensus.waveform import require
+from hybrid_model.consensus.waveform import require, require_phase
 
 __all__ = ["Gate"]
 
@@ -35,7 +35,7 @@ class Gate:
         """ValueError if a number is outside its range or not finite."""
         require("gate_rate", self.rate, self.rate > 0, "must be positive")
         require("duty_percent", self.duty_percent, 0 <= self.duty_percent <= 100, "must lie between 0 and 100")
-        require("phase", self.phase, True, "must be finite")
+        require_phase(self.phase)
 
     def segment(self, t: Any) -> Any:
         """Index of the segment that holds `t` [s]; even is open."""

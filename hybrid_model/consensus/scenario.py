@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from hybrid_model.consensus.affordable import require_affordable
 from hybrid_model.consensus.channel_data import IDEAL
 from hybrid_model.consensus.read_switching import read_switching
 from hybrid_model.consensus.read_weights import read_weights
@@ -102,7 +103,7 @@ def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = "
     top = Table("the scenario", entries, ("name", "stop_time", "network", "weights", "switching", "trigger", "channel"))
     network = _read_network(_subtable(top, "network", ("agents", "edges", "initial", "gain", "underlying")))
     edge_count = len(network.edges)
-    return Scenario(
+    scenario = Scenario(
         name=top.text("name"),
         stop_time=top.number("stop_time"),
         network=network,
@@ -111,6 +112,8 @@ def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = "
         trigger=_read_trigger(top),
         channel=_read_channel(top),
     )
+    require_affordable(scenario)
+    return scenario
 
 
 def _load_file(path: Path) -> Scenario:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.carriers import RippleCarrier, UnitCarrier
 from hybrid_model.consensus.gate import Gate
-from hybrid_model.consensus.waveform import ALWAYS, require
+from hybrid_model.consensus.waveform import ALWAYS, require, require_phase
 
 __all__ = ["SineWeight", "SquareWeight"]
 
@@ -45,7 +45,7 @@ class SineWeight:
         require("mean", self.mean, self.mean >= 0, "must not be negative")
         require("depth", self.depth, 0 <= self.depth <= 1, "must lie between 0 and 1, else the weight is negative")
         require("rate", self.rate, self.rate > 0, "must be positive")
-        require("phase", self.phase, True, "must be finite")
+        require_phase(self.phase)
 
     @property
     def carrier(self) -> RippleCarrier:

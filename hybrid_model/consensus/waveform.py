@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.carriers import Carrier
 
-__all__ = ["ALWAYS", "Waveform", "require"]
+__all__ = ["ALWAYS", "Waveform", "require", "require_phase"]
 
 ALWAYS = (-math.inf, math.inf)
 """The domain of a weight that is defined at all times."""
@@ -53,3 +53,8 @@ def require(name: str, value: float, is_valid: bool, rule: str) -> None:
         raise ValueError(f"{name} is {value}; it must be a finite number.")
     if not is_valid:
         raise ValueError(f"{name} is {value}; it {rule}.")
+
+
+def require_phase(phase: float) -> None:
+    """Check a phase [rad]: with a very large one nothing is left of the time in ``rate*t - phase``."""
+    require("phase", phase, abs(phase) <= 1e6, "must lie between -1e6 and 1e6")

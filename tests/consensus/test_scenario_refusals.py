@@ -207,6 +207,29 @@ def check_sentence(text, key):
         ),
         ("channel", {"seed": HUGE}, r"seed is 1000\.\.\. \(401 digits\); it must be a whole number .* 64 bits"),
         ("channel", {"seed": -GIANT}, r"seed is -\d{4}\.\.\. \(6021 digits\)"),
+        (
+            "weights",
+            {"kind": "gated-sine", "gate_rate": 1e25, "sine_rate": 1, "duty_percent": 20},
+            r"\[weights\] of edge 1: gate_rate makes about 2e\+25 changes up to stop_time, 10 s",
+        ),
+        (
+            "weights",
+            {"kind": "sine", "mean": 1, "depth": 0.5, "rate": [1, 1e300]},
+            "of edge 2: rate makes about 2e\\+300 changes",
+        ),
+        (
+            "weights",
+            {"kind": "piecewise", "starts": [0, 1e-9], "values": [1, 0], "cycle": 2e-9},
+            "cycle makes about 1e\\+10 changes",
+        ),
+        ("weights", {"kind": "sampled", "times": [0, 1e-9], "values": [1, 0], "repeat": True}, "times makes about 2e"),
+        ("switching", {"dwell": 1e-200, "active": [[1], [2]]}, "dwell makes about 1e\\+201 changes"),
+        ("trigger", {"kind": "periodic", "period": 1e-9}, r"\[trigger\] period makes about 1e\+10 changes"),
+        (
+            "weights",
+            {"kind": "sine", "mean": 1, "depth": 0.5, "rate": 1, "phase": 1e300},
+            "phase is 1e\\+300; it must lie between -1e6 and 1e6",
+        ),
         ("channel", {"slots": 10**6}, r"slots is 1000000; it must be at least 1 and at most 1000"),
         ("switching", {"dwell": 1, "active": [[HUGE]]}, r"active\[1\]\[1\] is 1000\.\.\. \(401 digits\)"),
         ("switching", {"dwell": 1, "active": [[7]]}, r"active phase 1 names edge 7"),
@@ -310,3 +333,8 @@ def test_command_line_answers_in_one_sentence_with_status_2(tmp_path, capsys, mo
     assert captured.out == ""
     assert captured.err.count("\n") == 1
     assert len(captured.err) < 400
+
+
+def test_a_trajectory_that_fills_the_memory_is_refused(capsys):
+    assert main(["simulate", "paper-a", "--stop-time", "1e20"]) == 2
+    assert "--output-interval 0.1 makes more than 1e+07 points" in capsys.readouterr().err
