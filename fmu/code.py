@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from fmu.derivatives import derivative_functions
 from fmu.trace import Trace
-from fmu.variables import Bank, FmuVariable
+from fmu.variables import FmuVariable
 from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import Kind
 
@@ -25,7 +26,7 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
-def model_code(traced: Trace, variables: Sequence[FmuVariable], token: str) -> str:
+def model_code(traced: Trace, variables: Sequence[FmuVariable], token: str, kinds: Collection[str]) -> str:
     """Return the C source of a model.
 
     Parameters
@@ -36,18 +37,38 @@ def model_code(traced: Trace, variables: Sequence[FmuVariable], token: str) -> s
         In the order of their value references.
     token : str
         Instantiation token.
+    kinds : collection of str
+        ``"cs"``, ``"me"``: what the FMU offers.
 
     Returns
     -------
     str
         A C99 translation unit that defines ``const Model model``.
     """
+    maps, work = _maps(traced)
+    tables = [*_tables(traced, variables), _model(traced, variables, token, kinds, work)]
+    return "\n".join([maps, *tables])
+
+
+def _maps(traced: Trace) -> tuple[str, Sequence[int]]:
+    """Return the definitions of the maps and of their derivatives, and the sizes of the work arrays they need."""
+    functions = [*traced.functions, *derivative_functions(traced).values()]
     generator = ca.CodeGenerator("model", _OPTIONS)
-    for function in traced.functions:
+    for function in functions:
         generator.add(function)
-    return "\n".join(
-        [generator.dump(), '#include "model.h"', "", *_tables(traced, variables), _model(traced, variables, token)]
-    )
+    resets = _array("ModelFunction ", "resets", (reset.name() for reset in traced.resets))
+    code = "\n".join([generator.dump(), '#include "model.h"', "", resets, _RESET])
+    return code, [max(getattr(f, size)() for f in functions) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
+
+
+_MAPS = ("start", "flow", "flow_set", "margins", "times", "outputs", "reset")
+_MAPS += ("forward", "reverse", "start_forward", "start_reverse")
+_RESET = """\
+static int hybrid_reset(size_t jump, const double **arg, double **res, long long *iw, double *w)
+{
+    return resets[jump](arg, res, iw, w, 0);
+}
+"""
 
 
 def string(text: str) -> str:
@@ -64,7 +85,7 @@ def _number(value: float) -> str:
 
 def _array(kind: str, name: str, items: Iterable[str]) -> str:
     # C has no empty arrays: a table without entries gets one that is never read.
-    entries = list(items) or ["0" if "char" in kind or "size_t" in kind or "double" in kind else "{0}"]
+    entries = list(items) or ["0" if "char" in kind or "size_t" in kind or "double" in kind or "Function" in kind else "{0}"]
     return f"static const {kind}{name}[] = {{\n    " + ",\n    ".join(entries) + "\n};\n"
 
 
@@ -86,26 +107,29 @@ def _tables(traced: Trace, variables: Sequence[FmuVariable]) -> list[str]:
 def _jumps(traced: Trace) -> list[str]:
     rows = []
     counts = {Trigger.STATE: 0, Trigger.TIME: 0}
-    for number, info in enumerate(traced.automaton.jumps):
+    for info in traced.automaton.jumps:
         kind = "JUMP_ON_STATE" if info.trigger is Trigger.STATE else "JUMP_ON_TIME"
         internal = "true" if info.internal else "false"
-        rows.append(f"{{{string(info.name)}, {kind}, {counts[info.trigger]}, {internal}, hybrid_reset{number}}}")
+        rows.append(f"{{{string(info.name)}, {kind}, {counts[info.trigger]}, {internal}}}")
         counts[info.trigger] += 1
     return rows
 
 
 def _variable(variable: FmuVariable) -> str:
     flags = ", ".join("true" if flag else "false" for flag in (variable.discrete, variable.calculated))
-    return f"{{{string(variable.name)}, {variable.type.value}, {variable.bank.value}, {variable.index}, {flags}}}"
+    place = f"{variable.bank.value}, {variable.index}, {variable.size}"
+    return f"{{{string(variable.name)}, {variable.type.value}, {place}, {flags}}}"
 
 
-def _model(traced: Trace, variables: Sequence[FmuVariable], token: str) -> str:
+def _model(
+    traced: Trace, variables: Sequence[FmuVariable], token: str, kinds: Collection[str], work: Sequence[int]
+) -> str:
     automaton, sizes = traced.automaton, traced.layout.sizes
-    work = [max(getattr(f, size)() for f in traced.functions) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
-    predictable = all(v.discrete for v in variables if v.bank is Bank.INPUT)
     fields = {
         "name": string(automaton.name),
         "token": string(token),
+        "co_simulation": _bool("cs" in kinds),
+        "model_exchange": _bool("me" in kinds),
         "n_states": sizes[Kind.STATE],
         "n_discrete": sizes[Kind.DISCRETE],
         "n_inputs": sizes[Kind.INPUT],
@@ -119,9 +143,9 @@ def _model(traced: Trace, variables: Sequence[FmuVariable], token: str) -> str:
         **dict(zip(("n_arg", "n_res", "n_iw", "n_w"), work, strict=True)),
         "flow_priority": _bool(automaton.priority is Priority.FLOW),
         "has_flow_set": _bool(automaton.has_flow_set),
-        "predictable": _bool(predictable),
+        "predictable": _bool(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
-        **{name: f"hybrid_{name}" for name in ("start", "flow", "flow_set", "margins", "times", "outputs")},
+        **{name: f"hybrid_{name}" for name in _MAPS},
         **{name: name for name in ("jumps", "clock_jump", "variables")},
         **{name: name for name in ("state_names", "discrete_names", "margin_names")},
     }

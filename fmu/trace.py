@@ -11,6 +11,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy import sparse
 
 from fmu.errors import TraceError
 from fmu.symbols import expressions, symbol_vector, symbols
@@ -18,6 +19,9 @@ from hybrid_model import Automaton, Values
 from hybrid_model.layout import Layout
 from hybrid_model.transitions import Assignments, Trigger
 from hybrid_model.variables import Kind, Variable
+
+ARGUMENTS = ("t", "x", "z", "u", "p")
+"""Arguments of every traced function, in order."""
 
 _COMPARISONS = (ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT, ca.OP_AND, ca.OP_OR)
 
@@ -52,6 +56,28 @@ class Trace:
     def functions(self) -> tuple[ca.Function, ...]:
         """All functions, in a fixed order."""
         return (self.start, self.flow, self.flow_set, self.margins, self.times, self.outputs, *self.resets)
+
+    def pattern(self, result: str, argument: str) -> sparse.csr_array:
+        """Return which elements of a result depend on which elements of an argument.
+
+        Parameters
+        ----------
+        result : {"flow", "outputs", "margins", "flow_set", "start_x", "start_z"}
+            Result of a map.
+        argument : {"t", "x", "z", "u", "p"}
+            Argument of all maps.
+
+        Returns
+        -------
+        csr_array of bool, shape (elements of the result, elements of the argument)
+        """
+        name, _, part = result.partition("_")
+        which = (self.start, "xz".index(part)) if name == "start" else (getattr(self, result), 0)
+        function, row = which
+        sparsity = function.jac_sparsity(row, ARGUMENTS.index(argument))
+        rows, columns = sparsity.get_triplet()
+        shape = (function.size1_out(row), function.size1_in(ARGUMENTS.index(argument)))
+        return sparse.csr_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=shape)
 
 
 def trace(automaton: Automaton) -> Trace:
@@ -195,17 +221,3 @@ class _Tracer:
 
     def _function(self, name: str, *results: ca.SX) -> ca.Function:
         return ca.Function(f"hybrid_{name}", self.arguments, [ca.densify(result) for result in results])
-
-
-def depends_on(function: ca.Function, result: int, argument: int) -> np.ndarray[Any, np.dtype[np.bool_]]:
-    """Return which elements of a function's result depend on which elements of an argument.
-
-    Returns
-    -------
-    ndarray of bool, shape (result elements, argument elements)
-    """
-    rows, columns = function.size1_out(result), function.size1_in(argument)
-    if rows == 0 or columns == 0:
-        return np.zeros((rows, columns), dtype=bool)
-    pattern = ca.DM(function.jac_sparsity(result, argument), 1)
-    return np.asarray(pattern.full(), dtype=bool)

@@ -83,7 +83,7 @@ class Composition(Automaton):
             self._wires[part][variable] = wire
         self._names = _scoped_names(self, names or {})
         self.variables = tuple(
-            variable.renamed(self._names[part, variable.name])
+            variable.renamed(self._names[part, variable.name], f"{part}.")
             for part, automaton in self.parts.items()
             for variable in automaton.variables
             if variable.name not in self._wires[part]

@@ -51,6 +51,8 @@ class Variable:
         A discrete state nobody outside the block needs to see, such as an index into a schedule.
     computed : bool
         The start value comes from ``start_map``.
+    dimensions : tuple of str
+        Names of the lengths that give the shape, where they have names.
     """
 
     name: str
@@ -63,6 +65,7 @@ class Variable:
     output: bool = False
     internal: bool = False
     computed: bool = False
+    dimensions: tuple[str, ...] = ()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -74,9 +77,9 @@ class Variable:
         """Number of scalars in the value."""
         return self.start.size
 
-    def renamed(self, name: str) -> Variable:
-        """Return the same variable under another name."""
-        return replace(self, name=name)
+    def renamed(self, name: str, scope: str = "") -> Variable:
+        """Return the same variable under another name; its dimensions go into the scope ``"part."``."""
+        return replace(self, name=name, dimensions=tuple(scope + dimension for dimension in self.dimensions))
 
 
 class Dimension:
@@ -146,7 +149,9 @@ class Declaration:
         start = np.full(shape, given) if given.shape == () else given
         if self.traits.get("integer") and not np.all(start == np.round(start)):
             raise DeclarationError(f"{owner}.{name} holds whole numbers, but its start value is {start}: round it.")
-        return Variable(name, self.kind, start, self.unit, self.description, **self.traits)
+        return Variable(
+            name, self.kind, start, self.unit, self.description, **self.traits, dimensions=self.shape
+        )
 
 
 def start_array(name: str, value: npt.ArrayLike) -> FloatArray:
@@ -299,7 +304,7 @@ class Values:
 
 def unknown_name(owner: str, name: str, known: Mapping[str, Any]) -> str:
     """Return the sentence for a name that an automaton does not have."""
-    return f"{owner} has no variable {name!r}; it has {', '.join(known)}."
+    return f"{owner} has no variable {name!r}; it has {', '.join(known) or 'none'}."
 
 
 def element_names(variable: Variable) -> list[str]:

@@ -84,7 +84,7 @@ static void *take(Cursor *cursor, size_t size)
 
 static Point take_point(Cursor *cursor, const Model *m)
 {
-    double *values = take(cursor, (2 + m->n_states + m->n_discrete + m->n_margins) * sizeof(double));
+    double *values = take(cursor, (2 + m->n_states + m->n_discrete + m->n_margins + 1) * sizeof(double));
     if (!values)
         return (Point){NULL, NULL, NULL, NULL, NULL};
     double *x = values + 2, *z = x + m->n_states;
@@ -107,13 +107,18 @@ static size_t lay_out_block(Engine *engine, unsigned char *memory)
     return cursor.used;
 }
 
+size_t seed_count(const Model *m)
+{
+    return 1 + 3 * m->n_states + 2 * m->n_discrete + m->n_inputs + m->n_parameters + m->n_outputs;
+}
+
 static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
 {
     const Model *m = engine->model;
     size_t vector = m->n_states * sizeof(double), rows = m->n_margins + 1;
     Cursor cursor = {memory, 0};
-    engine->arg = take(&cursor, (m->n_arg + MODEL_N_ARG) * sizeof(double *));
-    engine->res = take(&cursor, (m->n_res + 2) * sizeof(double *));
+    engine->arg = take(&cursor, (m->n_arg + MODEL_MAX_ARG) * sizeof(double *));
+    engine->res = take(&cursor, (m->n_res + MODEL_MAX_RES) * sizeof(double *));
     engine->iw = take(&cursor, m->n_iw * sizeof(long long));
     engine->w = take(&cursor, m->n_w * sizeof(double));
     engine->step.x1 = take(&cursor, vector);
@@ -130,6 +135,10 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     engine->times = take(&cursor, m->n_times * sizeof(double));
     engine->samples = take(&cursor, (N_SAMPLES + 1) * rows * sizeof(double));
     engine->outputs = take(&cursor, m->n_outputs * sizeof(double));
+    engine->rates = take(&cursor, vector);
+    engine->indicators = take(&cursor, rows * sizeof(double));
+    for (size_t i = 0; i < 2; i++)
+        engine->seeds[i] = take(&cursor, seed_count(m) * sizeof(double));
     engine->is_guard = take(&cursor, rows);
     engine->reset = take_point(&cursor, m);
     engine->shown = take_point(&cursor, m);
@@ -182,7 +191,7 @@ void copy_values(double *to, const double *from, size_t n)
 void copy_point(const Engine *engine, const Point *from, const Point *to)
 {
     const Model *m = engine->model;
-    copy_values(to->time, from->time, 2 + m->n_states + m->n_discrete + m->n_margins);
+    copy_values(to->time, from->time, 2 + m->n_states + m->n_discrete + m->n_margins + 1);
 }
 
 void engine_reset(Engine *engine)
@@ -213,4 +222,25 @@ void engine_restore(Engine *engine, const void *block)
 {
     memcpy(engine->block, block, engine->block_size);
     engine->view = VIEW_NONE;
+}
+
+void *engine_wrapper_in(const Engine *engine, void *block)
+{
+    Engine other = *engine;
+    lay_out_block(&other, block);
+    return other.wrapper;
+}
+
+bool engine_block_is_sound(const Engine *engine, void *block)
+{
+    Engine other = *engine;
+    lay_out_block(&other, block);
+    const Status *status = other.status;
+    bool sound = status->ending >= ENDED_NOT && status->ending <= ENDED_FAILED &&
+                 status->prediction >= PREDICTION_NONE && status->prediction <= PREDICTION_QUIET &&
+                 memchr(status->message, '\0', sizeof status->message) != NULL &&
+                 status->relative_tolerance >= RELATIVE_TOLERANCE && status->absolute_tolerance > 0.0;
+    for (size_t j = 0; j < engine->model->n_jumps; j++)
+        sound = sound && other.history[j].stored <= N_ZENO_TIMES;
+    return sound && isfinite(*other.live.time) && !isnan(*other.predicted.time);
 }

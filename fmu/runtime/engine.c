@@ -25,6 +25,15 @@ static double next_time(Engine *engine, const Point *point, bool visible, bool i
     return isfinite(next) ? next : first;
 }
 
+/* Shows the hook the state on the way; false if it has changed something. */
+static bool go_on(Engine *engine)
+{
+    double before = engine->target;
+    engine->view = VIEW_NONE;
+    engine->target = engine->hook(engine->hook_context, *engine->live.time, before);
+    return *engine->live.step > 0.0 && engine->target >= before;
+}
+
 /* Flows to `limit` or to the end of a piece without time events, or to the first guard crossing on it.
    Guards that are simultaneous with one before the limit may put the event beyond it, within the
    event tolerance, but never beyond the piece. */
@@ -33,7 +42,7 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
 {
     double end = fmin(limit, piece_end);
     double level = 0.0;
-    for (size_t i = 0; i < engine->model->n_margins; i++)
+    for (size_t i = 0; i <= engine->model->n_margins; i++)
         point->level[i] = 0.0;
     if (!step_begin(engine, point) || (locate && !flow_may_begin(engine, point, &level)))
         return FLOW_PROBLEM;
@@ -51,6 +60,8 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
                 return FLOW_PROBLEM;
         }
         step_commit(engine, point);
+        if (point == &engine->live && engine->hook && *point->time < end && !go_on(engine))
+            return FLOW_CHANGED;
     }
     return FLOW_REACHED;
 }
@@ -122,12 +133,25 @@ bool engine_predict(Engine *engine, double limit, double *event_time)
     return *event_time > now;
 }
 
-bool engine_next_time_event(Engine *engine, double *event_time)
+bool engine_next_time_event(Engine *engine, bool breakpoints, double *event_time)
 {
     if (engine->status->ending != ENDED_NOT || !evaluate_times(engine, &engine->live))
         return false;
-    *event_time = next_time(engine, &engine->live, true, false);
+    *event_time = next_time(engine, &engine->live, true, breakpoints);
     return isfinite(*event_time);
+}
+
+bool engine_arrive(Engine *engine)
+{
+    double next;
+    double *now = engine->live.time;
+    engine->view = VIEW_NONE;
+    if (!evaluate_times(engine, &engine->live))
+        return false;
+    next = next_time(engine, &engine->live, true, true);
+    if (next - *now <= TIME_ROUNDING_ULPS * time_ulp(next))
+        *now = next;
+    return raise_levels_here(engine, &engine->live);
 }
 
 /* Whether a breakpoint is due at the live point or comes up to `target`; the times must be there. */
@@ -156,9 +180,9 @@ static void flow_past_event(Engine *engine, double target)
 typedef enum { ON_THE_WAY, AT_PREDICTED_EVENT, NOT_PREDICTED } Progress;
 
 /* Uses the prediction, if there is one, as far as it carries. */
-static Progress follow_prediction(Engine *engine, double target, size_t *budget, FlowEnd *end)
+static Progress follow_prediction(Engine *engine, size_t *budget, FlowEnd *end)
 {
-    double event = *engine->predicted.time;
+    double event = *engine->predicted.time, target = engine->target;
     Prediction prediction = (Prediction)engine->status->prediction;
     bool quiet = prediction == PREDICTION_QUIET;
     if (prediction == PREDICTION_NONE)
@@ -174,13 +198,15 @@ static Progress follow_prediction(Engine *engine, double target, size_t *budget,
     return AT_PREDICTED_EVENT;
 }
 
-static Advance advance_locating(Engine *engine, double target, EventPolicy policy, size_t *budget)
+static Advance advance_locating(Engine *engine, double start, EventPolicy policy, size_t *budget)
 {
     for (;;) {
-        FlowEnd end = flow(engine, &engine->live, target, true, budget);
-        bool at_target = *engine->live.time >= target;
+        FlowEnd end = flow(engine, &engine->live, engine->target, true, budget);
+        bool at_target = *engine->live.time >= engine->target;
         if (end == FLOW_REACHED)
             return ADVANCE_REACHED;
+        if (end == FLOW_CHANGED)
+            continue;
         if (end == FLOW_BUDGET)
             too_many_steps(engine);
         if (end != FLOW_EVENT) {
@@ -193,28 +219,66 @@ static Advance advance_locating(Engine *engine, double target, EventPolicy polic
         *budget -= *budget > 0;
         if (!engine_jump_all(engine))
             return ADVANCE_ENDED;
+        double now = *engine->live.time;
+        if (policy == EVENTS_STOP_AFTER && now > start && engine->target - now > event_tolerance(now))
+            return ADVANCE_EVENT_BEFORE;
     }
+}
+
+/* Looks ahead where that saves work: after a step in which nothing came from outside, for as many more. */
+static void look_ahead(Engine *engine)
+{
+    Status *status = engine->status;
+    double event, now = *engine->live.time;
+    if (status->settled && status->prediction == PREDICTION_NONE && engine->model->predictable && !engine->hook)
+        engine_predict(engine, now + STEPS_AHEAD * (engine->target - now), &event);
+    status->settled = true;
+}
+
+double engine_target(const Engine *engine)
+{
+    return engine->target;
+}
+
+bool engine_foresees(const Engine *engine)
+{
+    return engine->status->prediction == PREDICTION_EVENT;
+}
+
+void engine_set_jump_hook(Engine *engine, JumpHook hook, void *context)
+{
+    engine->jump_hook = hook;
+    engine->jump_context = context;
+}
+
+void engine_set_hook(Engine *engine, StepHook hook, void *context)
+{
+    engine->hook = hook;
+    engine->hook_context = context;
 }
 
 Advance engine_advance(Engine *engine, double target, EventPolicy policy)
 {
     size_t budget = ADVANCE_STEPS;
+    double start = *engine->live.time;
     FlowEnd end = FLOW_REACHED;
     if (engine->status->ending != ENDED_NOT)
         return ADVANCE_ENDED;
     engine->status->jumps_taken = 0;
     engine_clear_ticks(engine);
     engine->view = VIEW_NONE;
-    Progress progress = follow_prediction(engine, target, &budget, &end);
+    engine->target = target;
+    look_ahead(engine);
+    Progress progress = follow_prediction(engine, &budget, &end);
     if (progress == ON_THE_WAY && end == FLOW_REACHED)
         return ADVANCE_REACHED;
-    if (progress == ON_THE_WAY) {
+    if (progress == ON_THE_WAY && end != FLOW_CHANGED) {
         if (end == FLOW_BUDGET)
             too_many_steps(engine);
         end_run(engine);
         return ADVANCE_ENDED;
     }
-    if (progress == AT_PREDICTED_EVENT && policy != EVENTS_INSIDE) {
+    if (progress == AT_PREDICTED_EVENT && (policy == EVENTS_STOP || policy == EVENTS_INSIDE_BEFORE_END)) {
         double event = *engine->live.time;
         bool at_target = target <= event + event_tolerance(event);
         if (at_target && target > event)
@@ -224,5 +288,5 @@ Advance engine_advance(Engine *engine, double target, EventPolicy policy)
         if (policy == EVENTS_STOP)
             return ADVANCE_EVENT_BEFORE;
     }
-    return advance_locating(engine, target, policy, &budget);
+    return advance_locating(engine, start, policy, &budget);
 }

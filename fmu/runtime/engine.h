@@ -1,5 +1,5 @@
 /* The version-neutral engine of an exported model: flow, jumps, event location, prediction,
-   save and restore.  It knows no FMI version; fmi3.c is a thin layer above it.
+   save and restore.  It knows no FMI version and no importer; instance.h is the layer above it.
 
    What evolves in a run lies in one contiguous block without pointers, so that saving a run
    is copying that block.  Nothing is allocated after engine_create. */
@@ -11,6 +11,12 @@
 
 #include "model.h"
 
+#if defined(__GNUC__)
+#define LIKE_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#else
+#define LIKE_PRINTF(text, first)
+#endif
+
 typedef struct Engine Engine;
 
 /* Why a run cannot go on. */
@@ -20,7 +26,8 @@ typedef enum { ENDED_NOT, ENDED_ZENO, ENDED_BLOCKED, ENDED_NOT_FINITE, ENDED_FAI
 typedef enum {
     EVENTS_INSIDE,              /* take every jump at its exact time */
     EVENTS_INSIDE_BEFORE_END,   /* the same, but leave jumps due at the target pending */
-    EVENTS_STOP                 /* stop at the first event */
+    EVENTS_STOP,                /* stop at the first event */
+    EVENTS_STOP_AFTER           /* take the jumps of the first event on the way, and stop there */
 } EventPolicy;
 
 typedef enum {
@@ -29,6 +36,12 @@ typedef enum {
     ADVANCE_EVENT_BEFORE,       /* at an event before the target */
     ADVANCE_ENDED               /* the run is over: see engine_message */
 } Advance;
+
+/* Called with each visible jump that is taken. */
+typedef void (*JumpHook)(void *context, double time, const char *name);
+/* Called during engine_advance after each step of the solver on the way, with the live state there and the target.
+   It may set inputs, and returns the target from now on: what it was given, or a nearer one. */
+typedef double (*StepHook)(void *context, double time, double target);
 
 /* What a reader is shown. */
 typedef enum {
@@ -49,17 +62,37 @@ void engine_reset(Engine *engine);
 size_t engine_block_size(const Engine *engine);
 void engine_save(const Engine *engine, void *block);
 void engine_restore(Engine *engine, const void *block);
+/* Whether a block that comes from outside (aligned as malloc does) could be one of this engine's. */
+bool engine_block_is_sound(const Engine *engine, void *block);
+/* The importer's layer's part of a block. */
+void *engine_wrapper_in(const Engine *engine, void *block);
 
-/* A relative tolerance looser than the engine's own is ignored. */
+/* The relative tolerance that an importer wishes for.  It buys speed only within bounds: the engine stays a
+   thousand times more precise, so that what it promises of event times holds. */
 void engine_set_tolerance(Engine *engine, double relative);
+void engine_set_hook(Engine *engine, StepHook hook, void *context);
+void engine_set_jump_hook(Engine *engine, JumpHook hook, void *context);
 void engine_set_time(Engine *engine, double t);
 double engine_time(const Engine *engine);
 /* Writes a value of BANK_STATE, BANK_DISCRETE, BANK_INPUT or BANK_PARAMETER.  A changed value
    makes a prediction invalid. */
 void engine_set(Engine *engine, Bank bank, size_t index, double value);
-/* The values of a bank (not time, not clocks) in a view; NULL if they cannot be computed, then
-   engine_problem says why. */
+/* Replaces all continuous states. */
+void engine_set_states(Engine *engine, const double *x);
+/* The values of a bank (states, inputs, parameters, outputs, derivatives, indicators) in a view; NULL if
+   they cannot be computed, then engine_problem says why.  Indicators are the margins of the jumps, then
+   that of the flow set if there is one. */
 const double *engine_values(Engine *engine, View view, Bank bank);
+size_t engine_indicators(const Engine *engine);
+/* Places of derivatives along a direction: of t (1), x, z, u, p; of dx/dt and y; of x and z as they are shown,
+   which in the view of the start values depend on what they are computed from. */
+enum { SEED_TIME, SEED_STATES, SEED_DISCRETE, SEED_INPUTS, SEED_PARAMETERS, SEED_RATES, SEED_OUTPUTS, SEED_SHOWN,
+       N_SEEDS = SEED_SHOWN + 2 };
+/* The engine's memory for them, zeroed. */
+void engine_seeds(Engine *engine, double *places[N_SEEDS]);
+/* Fills those from SEED_RATES on from those before (forward), or the other way round (reverse). */
+bool engine_forward(Engine *engine, View view, double *const seeds[N_SEEDS]);
+bool engine_reverse(Engine *engine, View view, double *const seeds[N_SEEDS]);
 
 /* Applies the computed start values and the breakpoints that are due. */
 bool engine_start(Engine *engine);
@@ -75,12 +108,19 @@ Advance engine_advance(Engine *engine, double target, EventPolicy policy);
    the limit if nothing happens before.  False if that is not ahead.  The state there is kept, and
    engine_advance takes it from there. */
 bool engine_predict(Engine *engine, double limit, double *event_time);
-/* The earliest visible time event after now. */
-bool engine_next_time_event(Engine *engine, double *event_time);
+/* Whether the last prediction, still valid, is of an event. */
+bool engine_foresees(const Engine *engine);
+/* The earliest time event after now; breakpoints of the flow only if asked for. */
+bool engine_next_time_event(Engine *engine, bool breakpoints, double *event_time);
+/* An importer that integrates by itself says that it has come to an event: guards that it stopped short of
+   by less than the event tolerance are enabled, and a time event that it missed by a rounding is due. */
+bool engine_arrive(Engine *engine);
 
 /* Clocks that ticked since engine_clear_ticks; engine_advance clears them when it begins. */
 bool engine_ticked(const Engine *engine, size_t clock);
 void engine_clear_ticks(Engine *engine);
+/* The target of the last engine_advance, nearer than the one asked for if the hook wanted that. */
+double engine_target(const Engine *engine);
 /* Visible jumps taken in the last engine_advance. */
 size_t engine_jumps_taken(const Engine *engine);
 

@@ -1,116 +1,49 @@
-/* FMI 3.0 for Co-Simulation: a thin layer over the engine.
+/* FMI 3.0: life cycle, events, steps and Model Exchange, a thin layer over instance.h. */
+#include "fmi3_parts.h"
 
-   It holds the calling rules of the standard, checks what comes from outside, and translates.
-   What evolves here (Run) lies in the engine's block, so that saving a run saves it as well. */
-#include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
-#include "fmi3_instance.h"
-
-/* A saved state: a mark to recognise it by, and the engine's block. */
 typedef struct {
-    const Model *model;
-    size_t size;
-    unsigned char block[];
-} SavedState;
+    Instance base;             /* first, so that one is the other */
+    fmi3InstanceEnvironment environment;
+    fmi3LogMessageCallback log;
+    fmi3IntermediateUpdateCallback update;
+} Fmi3;
 
-/* ---- logging and calling rules ---- */
-
-fmi3Status refuse(const Instance *instance, const char *format, ...)
+static void log_line(const Instance *instance, Answer level, const char *category, const char *message)
 {
-    char message[1024];
-    va_list arguments;
-    if (!instance || !instance->log)
-        return fmi3Error;
-    va_start(arguments, format);
-    vsnprintf(message, sizeof message, format, arguments);
-    va_end(arguments);
-    end_text_cleanly(message);
-    instance->log(instance->environment, fmi3Error, "logStatusError", message);
-    return fmi3Error;
+    const Fmi3 *own = (const Fmi3 *)instance;
+    own->log(own->environment, status_of(level), category, message);
 }
 
-const char *mode_name(int mode)
+static Fmi3 prototype(Interface interface, fmi3String name, fmi3Boolean logging, fmi3InstanceEnvironment environment,
+                      fmi3LogMessageCallback log)
 {
-    switch (mode) {
-    case MODE_INSTANTIATED: return "Instantiated";
-    case MODE_INITIALIZATION: return "Initialization Mode";
-    case MODE_EVENT: return "Event Mode";
-    case MODE_STEP: return "Step Mode";
-    default: return "Terminated";
-    }
+    const Fmi3 made = {.base = {.name = name, .interface = interface, .logging = logging,
+                                .log_line = log ? log_line : NULL},
+                       .environment = environment, .log = log};
+    return made;
 }
 
-Instance *enter(fmi3Instance handle, const char *function, int modes)
-{
-    Instance *instance = handle;
-    if (!instance)
-        return NULL;
-    if (instance->run->mode & modes)
-        return instance;
-    refuse(instance, "%s: %s must not be called in the state '%s'.", instance->name, function,
-           mode_name(instance->run->mode));
-    return NULL;
-}
-
-fmi3Status null_argument(const Instance *instance, const char *function)
-{
-    return refuse(instance, "%s: %s was called with a null pointer; every argument needs a place to point to.",
-                  instance->name, function);
-}
+/* ---- life cycle ---- */
 
 const char *fmi3GetVersion(void)
 {
     return fmi3Version;
 }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance handle, fmi3Boolean loggingOn, size_t nCategories,
+fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
                                const fmi3String categories[])
 {
-    /* There is nothing but errors to log, and those are not switched off. */
-    (void)loggingOn;
-    Instance *instance = enter(handle, "fmi3SetDebugLogging", MODE_ANY);
-    if (!instance)
-        return fmi3Error;
-    return nCategories > 0 && !categories ? null_argument(instance, "fmi3SetDebugLogging") : fmi3OK;
+    return status_of(instance_log(instance, __func__, loggingOn, nCategories, categories));
 }
 
-/* ---- life cycle ---- */
-
-static void set_up(Instance *instance)
+fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
+                                          fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
+                                          fmi3InstanceEnvironment instanceEnvironment,
+                                          fmi3LogMessageCallback logMessage)
 {
-    engine_reset(instance->engine);
-    instance->run->mode = MODE_INSTANTIATED;
-    instance->run->time = 0.0;
-    instance->run->stop_time = INFINITY;
-    instance->run->end_reported = false;
-}
-
-static bool is_blank(const char *text)
-{
-    return !text || text[strspn(text, " \t\r\n")] == '\0';
-}
-
-static Instance *create(const char *name)
-{
-    size_t size = strlen(name) + 1;
-    Instance *instance = calloc(1, sizeof *instance);
-    if (!instance)
-        return NULL;
-    instance->name = malloc(size);
-    instance->engine = engine_create(&model, sizeof(Run));
-    if (!instance->name || !instance->engine) {
-        engine_free(instance->engine);
-        free(instance->name);
-        free(instance);
-        return NULL;
-    }
-    memcpy(instance->name, name, size);
-    instance->run = engine_wrapper(instance->engine);
-    return instance;
+    const Fmi3 made = prototype(MODEL_EXCHANGE, instanceName, loggingOn, instanceEnvironment, logMessage);
+    (void)resourcePath, (void)visible;
+    return instance_new(&made.base, sizeof made, __func__, instantiationToken);
 }
 
 fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String instantiationToken,
@@ -122,46 +55,18 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
                                          fmi3LogMessageCallback logMessage,
                                          fmi3IntermediateUpdateCallback intermediateUpdate)
 {
-    const Instance nobody = {.environment = instanceEnvironment, .log = logMessage};
-    const char *function = "fmi3InstantiateCoSimulation";
-    (void)resourcePath, (void)visible, (void)loggingOn, (void)requiredIntermediateVariables, (void)intermediateUpdate;
-    if (is_blank(instanceName)) {
-        refuse(&nobody, "%s: the instance name is missing; it needs at least one visible character.", function);
-        return NULL;
-    }
-    if (!instantiationToken || strcmp(instantiationToken, model.token) != 0) {
-        refuse(&nobody, "%s: %s: the instantiation token '%s' is not this FMU's '%s'. Remedy: use the "
-               "modelDescription.xml of the same FMU.",
-               instanceName, function, instantiationToken ? instantiationToken : "(null)", model.token);
-        return NULL;
-    }
-    if (nRequiredIntermediateVariables > 0) {
-        refuse(&nobody, "%s: %s: this FMU has no intermediate update, so no intermediate variables can be required.",
-               instanceName, function);
-        return NULL;
-    }
-    Instance *instance = create(instanceName);
-    if (!instance) {
-        refuse(&nobody, "%s: %s: out of memory.", instanceName, function);
-        return NULL;
-    }
-    instance->environment = instanceEnvironment;
-    instance->log = logMessage;
-    instance->event_mode_used = eventModeUsed;
-    instance->early_return_allowed = earlyReturnAllowed;
-    set_up(instance);
-    return instance;
-}
-
-fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
-                                          fmi3String resourcePath, fmi3Boolean visible, fmi3Boolean loggingOn,
-                                          fmi3InstanceEnvironment instanceEnvironment,
-                                          fmi3LogMessageCallback logMessage)
-{
-    const Instance nobody = {.environment = instanceEnvironment, .log = logMessage};
-    (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
-    refuse(&nobody, "fmi3InstantiateModelExchange is not supported: this FMU is for Co-Simulation.");
-    return NULL;
+    Fmi3 made = prototype(CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
+    (void)resourcePath, (void)visible;
+    for (size_t i = 0; requiredIntermediateVariables && i < nRequiredIntermediateVariables; i++)
+        if (requiredIntermediateVariables[i] >= model.n_variables) {
+            refuse(&made.base, "%s: there is no variable with the value reference %lu.", __func__,
+                   (unsigned long)requiredIntermediateVariables[i]);
+            return NULL;
+        }
+    made.base.event_mode_used = eventModeUsed;
+    made.base.early_return_allowed = earlyReturnAllowed;
+    made.update = intermediateUpdate;
+    return instance_new(&made.base, sizeof made, __func__, instantiationToken);
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -171,261 +76,150 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
                                                fmi3LockPreemptionCallback lockPreemption,
                                                fmi3UnlockPreemptionCallback unlockPreemption)
 {
-    const Instance nobody = {.environment = instanceEnvironment, .log = logMessage};
-    (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
+    const Fmi3 nobody = prototype(CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
+    (void)instantiationToken, (void)resourcePath, (void)visible;
     (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
-    refuse(&nobody, "fmi3InstantiateScheduledExecution is not supported: this FMU is for Co-Simulation.");
+    refuse(&nobody.base, "%s: this FMU is not for Scheduled Execution.", __func__);
     return NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance handle)
+void fmi3FreeInstance(fmi3Instance instance)
 {
-    Instance *instance = handle;
-    if (!instance)
-        return;
-    engine_free(instance->engine);
-    free(instance->name);
-    free(instance);
+    instance_free(instance, __func__);
 }
 
-fmi3Status fmi3Reset(fmi3Instance handle)
-{
-    Instance *instance = enter(handle, "fmi3Reset", MODE_ANY);
-    if (!instance)
-        return fmi3Error;
-    set_up(instance);
-    return fmi3OK;
-}
+/* Functions of an instance alone. */
+#define DEFINE_PLAIN(NAME, ANSWER)                                                                                     \
+    fmi3Status NAME(fmi3Instance instance)                                                                             \
+    {                                                                                                                  \
+        return status_of(ANSWER);                                                                                      \
+    }
 
-fmi3Status fmi3Terminate(fmi3Instance handle)
-{
-    Instance *instance = enter(handle, "fmi3Terminate", MODE_EVENT | MODE_STEP);
-    if (!instance)
-        return fmi3Error;
-    instance->run->mode = MODE_TERMINATED;
-    return fmi3OK;
-}
+DEFINE_PLAIN(fmi3Reset, instance_reset(instance, __func__))
+DEFINE_PLAIN(fmi3Terminate, instance_terminate(instance, __func__))
+DEFINE_PLAIN(fmi3EnterConfigurationMode, instance_configure(instance, __func__, true))
+DEFINE_PLAIN(fmi3ExitConfigurationMode, instance_configure(instance, __func__, false))
+DEFINE_PLAIN(fmi3ExitInitializationMode, instance_exit_initialization(instance, __func__))
+DEFINE_PLAIN(fmi3EnterEventMode, instance_enter_event_mode(instance, __func__, MODE_STEP | MODE_CONTINUOUS))
+DEFINE_PLAIN(fmi3EnterStepMode, instance_leave_event_mode(instance, __func__, MODE_STEP))
+DEFINE_PLAIN(fmi3EnterContinuousTimeMode, instance_leave_event_mode(instance, __func__, MODE_CONTINUOUS))
 
-fmi3Status fmi3EnterInitializationMode(fmi3Instance handle, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
+fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
-    Instance *instance = enter(handle, "fmi3EnterInitializationMode", MODE_INSTANTIATED);
-    if (!instance)
-        return fmi3Error;
-    if (toleranceDefined && !(isfinite(tolerance) && tolerance > 0.0))
-        return refuse(instance, "%s: the tolerance %g must be finite and above zero.", instance->name, tolerance);
-    if (!isfinite(startTime))
-        return refuse(instance, "%s: the start time %g must be finite.", instance->name, startTime);
-    if (stopTimeDefined && !(isfinite(stopTime) && stopTime >= startTime))
-        return refuse(instance, "%s: the stop time %.17g must be finite and not before the start time %.17g.",
-                      instance->name, stopTime, startTime);
-    if (toleranceDefined)
-        engine_set_tolerance(instance->engine, tolerance);
-    engine_set_time(instance->engine, startTime);
-    instance->run->time = startTime;
-    instance->run->stop_time = stopTimeDefined ? stopTime : INFINITY;
-    instance->run->mode = MODE_INITIALIZATION;
-    return fmi3OK;
+    const Experiment experiment = {toleranceDefined, stopTimeDefined, tolerance, startTime, stopTime};
+    Answer answer = instance_set_up(instance, __func__, &experiment);
+    return status_of(answer == ANSWER_OK ? instance_enter_initialization(instance, __func__) : answer);
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance handle)
-{
-    Instance *instance = enter(handle, "fmi3ExitInitializationMode", MODE_INITIALIZATION);
-    if (!instance)
-        return fmi3Error;
-    Engine *engine = instance->engine;
-    if (!engine_start(engine))
-        return refuse(instance, "%s: %s", instance->name, engine_problem(engine));
-    if (!instance->event_mode_used && !engine_jump_all(engine))
-        return refuse(instance, "%s: %s", instance->name, engine_message(engine));
-    engine_clear_ticks(engine);
-    instance->run->mode = instance->event_mode_used ? MODE_EVENT : MODE_STEP;
-    return fmi3OK;
-}
+/* ---- events ---- */
 
-/* ---- saved states ---- */
-
-static bool is_own(const Instance *instance, const SavedState *saved)
-{
-    return saved->model == &model && saved->size == engine_block_size(instance->engine);
-}
-
-static fmi3Status foreign_state(const Instance *instance, const char *function)
-{
-    return refuse(instance, "%s: %s: this is not a state of this FMU.", instance->name, function);
-}
-
-fmi3Status fmi3GetFMUState(fmi3Instance handle, fmi3FMUState *FMUState)
-{
-    Instance *instance = enter(handle, "fmi3GetFMUState", MODE_ANY);
-    if (!instance)
-        return fmi3Error;
-    if (!FMUState)
-        return null_argument(instance, "fmi3GetFMUState");
-    size_t size = engine_block_size(instance->engine);
-    SavedState *saved = *FMUState;
-    if (saved && !is_own(instance, saved))
-        return foreign_state(instance, "fmi3GetFMUState");
-    if (!saved) {
-        saved = malloc(sizeof *saved + size);
-        if (!saved)
-            return refuse(instance, "%s: fmi3GetFMUState: out of memory.", instance->name);
-        saved->model = &model;
-        saved->size = size;
-    }
-    engine_save(instance->engine, saved->block);
-    *FMUState = saved;
-    return fmi3OK;
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance handle, fmi3FMUState FMUState)
-{
-    Instance *instance = enter(handle, "fmi3SetFMUState", MODE_ANY);
-    const SavedState *saved = FMUState;
-    if (!instance)
-        return fmi3Error;
-    if (!saved)
-        return null_argument(instance, "fmi3SetFMUState");
-    if (!is_own(instance, saved))
-        return foreign_state(instance, "fmi3SetFMUState");
-    engine_restore(instance->engine, saved->block);
-    return fmi3OK;
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance handle, fmi3FMUState *FMUState)
-{
-    if (!enter(handle, "fmi3FreeFMUState", MODE_ANY))
-        return fmi3Error;
-    if (FMUState) {
-        free(*FMUState);
-        *FMUState = NULL;
-    }
-    return fmi3OK;
-}
-
-/* ---- Event Mode ---- */
-
-fmi3Status fmi3EnterEventMode(fmi3Instance handle)
-{
-    Instance *instance = enter(handle, "fmi3EnterEventMode", MODE_STEP);
-    if (!instance)
-        return fmi3Error;
-    if (!instance->event_mode_used)
-        return refuse(instance, "%s: fmi3EnterEventMode: the FMU was instantiated with eventModeUsed = false.",
-                      instance->name);
-    instance->run->mode = MODE_EVENT;
-    return fmi3OK;
-}
-
-fmi3Status fmi3EnterStepMode(fmi3Instance handle)
-{
-    Instance *instance = enter(handle, "fmi3EnterStepMode", MODE_EVENT);
-    if (!instance)
-        return fmi3Error;
-    engine_clear_ticks(instance->engine);
-    instance->run->mode = MODE_STEP;
-    return fmi3OK;
-}
-
-/* The time of the next event, if it can be known: predicted where all inputs are discrete, the next
-   time event otherwise. */
-static bool next_event(const Instance *instance, double *event_time)
-{
-    return model.predictable ? engine_predict(instance->engine, instance->run->stop_time, event_time)
-                             : engine_next_time_event(instance->engine, event_time);
-}
-
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance handle, fmi3Boolean *discreteStatesNeedUpdate,
+fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
                                     fmi3Boolean *terminateSimulation, fmi3Boolean *nominalsOfContinuousStatesChanged,
                                     fmi3Boolean *valuesOfContinuousStatesChanged, fmi3Boolean *nextEventTimeDefined,
                                     fmi3Float64 *nextEventTime)
 {
-    Instance *instance = enter(handle, "fmi3UpdateDiscreteStates", MODE_EVENT);
-    if (!instance)
+    EventUpdate update;
+    Instance *own = enter(instance, __func__, MODE_EVENT);
+    if (!own)
         return fmi3Error;
     if (!discreteStatesNeedUpdate || !terminateSimulation || !nominalsOfContinuousStatesChanged ||
         !valuesOfContinuousStatesChanged || !nextEventTimeDefined || !nextEventTime)
-        return null_argument(instance, "fmi3UpdateDiscreteStates");
-    Engine *engine = instance->engine;
-    bool changed = false;
-    *terminateSimulation = !engine_jump(engine, &changed);
-    *discreteStatesNeedUpdate = !*terminateSimulation && engine_pending(engine) < model.n_jumps;
-    *nominalsOfContinuousStatesChanged = false;
-    *valuesOfContinuousStatesChanged = changed;
-    /* This iteration's clocks are over; the next one's are those of the jump that comes next. */
-    engine_clear_ticks(engine);
-    *nextEventTimeDefined =
-        !*terminateSimulation && !*discreteStatesNeedUpdate && next_event(instance, nextEventTime);
-    if (!*nextEventTimeDefined)
-        *nextEventTime = 0.0;
-    if (*terminateSimulation)
-        refuse(instance, "%s: %s", instance->name, engine_message(engine));
-    return fmi3OK;
+        return status_of(null_argument(own, __func__));
+    Answer answer = instance_update(own, __func__, &update);
+    *discreteStatesNeedUpdate = update.again;
+    *terminateSimulation = update.terminate;
+    *nominalsOfContinuousStatesChanged = update.nominals_changed;
+    *valuesOfContinuousStatesChanged = update.states_changed;
+    *nextEventTimeDefined = update.has_next;
+    *nextEventTime = update.next;
+    return status_of(answer);
 }
 
-/* ---- Step Mode ---- */
+/* ---- Co-Simulation ---- */
 
-/* Rounding that an importer's own arithmetic may leave between two ways to write one time. */
-static double time_rounding(double a, double b)
+/* Shows the importer the state on the way of a step; it may ask for the step to end there or soon after. */
+static double show_intermediate(void *context, double time, double target)
 {
-    return 32.0 * time_ulp(fmax(fabs(a), fabs(b)));
+    Fmi3 *own = context;
+    Run *run = own->base.run;
+    bool may_end = own->base.early_return_allowed, asked = false;
+    fmi3Float64 end = target;
+    run->mode = MODE_INTERMEDIATE;
+    own->update(own->environment, time, true, true, true, may_end, &asked, &end);
+    run->mode = MODE_STEP;
+    if (!may_end || !asked || !(end < target))
+        return target;
+    return end > time ? end : time;
 }
 
-static fmi3Status check_step(const Instance *instance, double point, double size, double target)
-{
-    const Run *run = instance->run;
-    const char *name = instance->name;
-    if (run->end_reported)
-        return refuse(instance, "%s: the run is over: %s", name, engine_message(instance->engine));
-    if (!isfinite(size) || size <= 0.0)
-        return refuse(instance, "%s: fmi3DoStep: the step size %g must be finite and above zero.", name, size);
-    if (!isfinite(point) || !isfinite(target))
-        return refuse(instance, "%s: fmi3DoStep: the step from %g to %g must begin and end at finite times.", name,
-                      point, target);
-    if (fabs(point - run->time) > time_rounding(point, fmax(fabs(run->time), size)))
-        return refuse(instance, "%s: fmi3DoStep: the step begins at %.17g, but the FMU is at %.17g; steps must follow "
-                      "each other without gap or repeat.",
-                      name, point, run->time);
-    if (target > run->stop_time + time_rounding(target, run->stop_time))
-        return refuse(instance, "%s: fmi3DoStep: the step ends at %.17g, after the stop time %.17g.", name, target,
-                      run->stop_time);
-    return fmi3OK;
-}
-
-fmi3Status fmi3DoStep(fmi3Instance handle, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
+fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded,
                       fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
+    StepReport report;
+    Fmi3 *own = (Fmi3 *)enter(instance, __func__, MODE_STEP);
     (void)noSetFMUStatePriorToCurrentPoint;
-    Instance *instance = enter(handle, "fmi3DoStep", MODE_STEP);
-    if (!instance)
+    if (!own)
         return fmi3Error;
     if (!eventHandlingNeeded || !terminateSimulation || !earlyReturn || !lastSuccessfulTime)
-        return null_argument(instance, "fmi3DoStep");
-    Engine *engine = instance->engine;
-    Run *run = instance->run;
-    double target = currentCommunicationPoint + communicationStepSize;
-    *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
-    *lastSuccessfulTime = run->time;
-    if (check_step(instance, currentCommunicationPoint, communicationStepSize, target) != fmi3OK)
-        return fmi3Error;
-    bool may_stop = instance->event_mode_used && instance->early_return_allowed;
-    Advance advance = engine_advance(engine, target,
-                                     may_stop                    ? EVENTS_STOP
-                                     : instance->event_mode_used ? EVENTS_INSIDE_BEFORE_END
-                                                                 : EVENTS_INSIDE);
-    bool reached = advance == ADVANCE_REACHED || advance == ADVANCE_EVENT_AT_TARGET;
-    bool pending = advance == ADVANCE_EVENT_AT_TARGET || advance == ADVANCE_EVENT_BEFORE;
-    run->time = reached ? target : fmin(engine_time(engine), target);
-    *lastSuccessfulTime = run->time;
-    *eventHandlingNeeded = pending || (instance->event_mode_used && engine_jumps_taken(engine) > 0);
-    *terminateSimulation = advance == ADVANCE_ENDED;
-    *earlyReturn = instance->early_return_allowed && run->time < target;
-    if (advance == ADVANCE_ENDED) {
-        *eventHandlingNeeded = false;
-        run->end_reported = true;
-        refuse(instance, "%s: %s", instance->name, engine_message(engine));
-    }
-    /* The call itself succeeded: it computed what there is, and says by its flags that it is the end. */
-    return fmi3OK;
+        return status_of(null_argument(&own->base, __func__));
+    bool events = own->base.event_mode_used;
+    EventPolicy policy = !events                          ? EVENTS_INSIDE
+                         : own->base.early_return_allowed ? EVENTS_STOP
+                                                          : EVENTS_INSIDE_BEFORE_END;
+    engine_set_hook(own->base.engine, own->update ? show_intermediate : NULL, own);
+    Answer answer =
+        instance_step(own, __func__, currentCommunicationPoint, communicationStepSize, policy, &report);
+    *eventHandlingNeeded = events && report.event;
+    *terminateSimulation = report.terminate;
+    *earlyReturn = own->base.early_return_allowed && report.early;
+    *lastSuccessfulTime = report.reached;
+    return status_of(answer);
 }
+
+/* ---- Model Exchange ---- */
+
+fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
+{
+    return status_of(instance_set_time(instance, __func__, time));
+}
+
+fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
+                                   size_t nContinuousStates)
+{
+    return status_of(instance_set_states(instance, __func__, continuousStates, nContinuousStates));
+}
+
+fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                       fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
+{
+    (void)noSetFMUStatePriorToCurrentPoint;
+    return status_of(instance_completed_step(instance, __func__, enterEventMode, terminateSimulation));
+}
+
+#define DEFINE_VECTOR(NAME, ANSWER)                                                                                    \
+    fmi3Status NAME(fmi3Instance instance, fmi3Float64 values[], size_t n)                                             \
+    {                                                                                                                  \
+        return status_of(ANSWER);                                                                                      \
+    }
+
+DEFINE_VECTOR(fmi3GetContinuousStates, instance_get_vector(instance, __func__, BANK_STATE, values, n))
+DEFINE_VECTOR(fmi3GetContinuousStateDerivatives, instance_get_vector(instance, __func__, BANK_DERIVATIVE, values, n))
+DEFINE_VECTOR(fmi3GetEventIndicators, instance_get_vector(instance, __func__, BANK_INDICATOR, values, n))
+DEFINE_VECTOR(fmi3GetNominalsOfContinuousStates, instance_nominals(instance, __func__, values, n))
+
+#define DEFINE_COUNT(NAME, COUNT)                                                                                      \
+    fmi3Status NAME(fmi3Instance instance, size_t *count)                                                              \
+    {                                                                                                                  \
+        const Instance *own = enter(instance, __func__, MODE_ANY);                                                     \
+        if (!own)                                                                                                      \
+            return fmi3Error;                                                                                          \
+        if (!count)                                                                                                    \
+            return status_of(null_argument(own, __func__));                                                            \
+        *count = COUNT;                                                                                                \
+        return fmi3OK;                                                                                                 \
+    }
+
+DEFINE_COUNT(fmi3GetNumberOfContinuousStates, model.n_states)
+DEFINE_COUNT(fmi3GetNumberOfEventIndicators, engine_indicators(own->engine))

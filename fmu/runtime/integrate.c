@@ -162,6 +162,18 @@ static bool step_too_small(Engine *engine, const Point *point, double h, bool fi
                    h, *point->time, name, value);
 }
 
+/* The proposal for the step after one of the length `used` where `h` was possible. */
+static double next_step(double h, double used, double error, bool rejected)
+{
+    const double most = 10.0;
+    /* A step cut short by the limit says little about the next one, and no root need be taken. */
+    if (used * most <= h)
+        return h;
+    double growth = error > 0.0 ? fmin(most, 0.9 * pow(error, -0.2)) : most;
+    double proposal = used * (rejected ? fmin(1.0, growth) : fmax(0.2, growth));
+    return used < h ? fmax(h, proposal) : proposal;
+}
+
 bool step_accept(Engine *engine, const Point *point, double limit)
 {
     Step *step = &engine->step;
@@ -180,9 +192,7 @@ bool step_accept(Engine *engine, const Point *point, double limit)
             return false;
         double error = step_error(engine, step, used);
         if (error <= 1.0) {
-            double growth = error > 0.0 ? fmin(10.0, 0.9 * pow(error, -0.2)) : 10.0;
-            double proposal = used * (rejected ? fmin(1.0, growth) : fmax(0.2, growth));
-            *point->step = used < h ? fmax(h, proposal) : proposal;
+            *point->step = next_step(h, used, error, rejected);
             step->has_dense = false;
             return true;
         }

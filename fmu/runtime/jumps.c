@@ -37,11 +37,23 @@ bool accept_state(Engine *engine, const char *source, const Point *point)
     return true;
 }
 
+static bool evaluate_reset(Engine *engine, size_t jump, const Point *point)
+{
+    engine->arg[0] = point->time;
+    engine->arg[1] = point->x;
+    engine->arg[2] = point->z;
+    engine->arg[3] = engine->u;
+    engine->arg[4] = engine->p;
+    engine->res[0] = engine->reset.x;
+    engine->res[1] = engine->reset.z;
+    return engine->model->reset(jump, engine->arg, engine->res, engine->iw, engine->w) == 0;
+}
+
 bool apply_reset(Engine *engine, size_t jump, const Point *point)
 {
     const ModelJump *entry = &engine->model->jumps[jump];
     char source[MESSAGE_SIZE / 4];
-    if (!evaluate(engine, entry->reset, *point->time, point->x, point->z, engine->reset.x, engine->reset.z))
+    if (!evaluate_reset(engine, jump, point))
         return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.", entry->name,
                        *point->time);
     snprintf(source, sizeof source, "the jump map of '%s'", entry->name);
@@ -125,7 +137,7 @@ static bool flow_is_over(Engine *engine, const Point *point, bool *over)
         return false;
     *over = margin < -EVENT_TOLERANCE;
     /* On the border, up to rounding, it depends on where the flow leads. */
-    if (*over || margin > 0.0)
+    if (*over || margin > point->level[engine->model->n_margins])
         return true;
     if (!step_begin(engine, point) || !step_probe(engine, point, soon) ||
         !evaluate_flow_set(engine, soon, engine->probe_x, point->z, &later))
@@ -188,7 +200,10 @@ static bool take_jump(Engine *engine, size_t jump)
         return end_run(engine);
     if (engine->model->jumps[jump].kind == JUMP_ON_STATE)
         engine->live.level[engine->model->jumps[jump].index] = 0.0;
+    engine->live.level[engine->model->n_margins] = 0.0;
     tick(engine, jump);
+    if (engine->jump_hook)
+        engine->jump_hook(engine->jump_context, *engine->live.time, engine->model->jumps[jump].name);
     return count_jump(engine, jump) || end_run(engine);
 }
 

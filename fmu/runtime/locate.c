@@ -94,6 +94,22 @@ bool raise_levels(Engine *engine, const Point *point, double t)
     return true;
 }
 
+bool raise_levels_here(Engine *engine, const Point *point)
+{
+    const Model *m = engine->model;
+    double now, later, soon = *point->time + event_tolerance(*point->time);
+    if (!step_begin(engine, point) || !raise_levels(engine, point, *point->time))
+        return false;
+    if (!m->flow_priority || !m->has_flow_set)
+        return true;
+    if (!evaluate_flow_set(engine, *point->time, point->x, point->z, &now) || !step_probe(engine, point, soon) ||
+        !evaluate_flow_set(engine, soon, engine->probe_x, point->z, &later))
+        return false;
+    if (now > 0.0 && later < 0.0)
+        point->level[m->n_margins] = now;
+    return true;
+}
+
 FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end)
 {
     const Model *m = engine->model;

@@ -9,11 +9,16 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-/* Calling convention of the generated functions (CasADi): arg[i] is input i, res[i] output i,
-   iw and w are work arrays of n_iw integers and n_w doubles; 0 means success. */
+/* Calling convention of the generated functions (CasADi): arg[i] is input i (NULL: zeros), res[i] output i
+   (NULL: not wanted), iw and w are work arrays of n_iw integers and n_w doubles; 0 means success. */
 typedef int (*ModelFunction)(const double **arg, double **res, long long *iw, double *w, int mem);
 /* Inputs of each of them, in this order: t (1), x (n_states), z (n_discrete), u (n_inputs), p (n_parameters). */
 #define MODEL_N_ARG 5
+/* Most inputs and outputs of a function, with the seeds of derivatives. */
+#define MODEL_MAX_ARG 10
+#define MODEL_MAX_RES 5
+/* The state after a jump: x+ (n_states), z+ (n_discrete). */
+typedef int (*ModelReset)(size_t jump, const double **arg, double **res, long long *iw, double *w);
 
 typedef enum { JUMP_ON_STATE, JUMP_ON_TIME } JumpKind;
 
@@ -22,17 +27,21 @@ typedef struct {
     JumpKind kind;
     size_t index;          /* of its margin among the jump margins, or of its time among the times */
     bool internal;         /* a breakpoint of the flow: depends on t, z, p only, is invisible outside (JUMP_ON_TIME only) */
-    ModelFunction reset;   /* (t,x,z,u,p) -> x+ (n_states), z+ (n_discrete) */
 } ModelJump;
 
-typedef enum { BANK_TIME, BANK_STATE, BANK_DISCRETE, BANK_INPUT, BANK_PARAMETER, BANK_OUTPUT, BANK_CLOCK } Bank;
-typedef enum { TYPE_FLOAT64, TYPE_INT32, TYPE_BOOLEAN, TYPE_CLOCK } Type;
+/* SIZE is the length of arrays, COUNTDOWN the clock of the next event, OPTION a switch of the interface. */
+typedef enum {
+    BANK_TIME, BANK_STATE, BANK_DISCRETE, BANK_INPUT, BANK_PARAMETER, BANK_OUTPUT, BANK_CLOCK,
+    BANK_DERIVATIVE, BANK_INDICATOR, BANK_SIZE, BANK_COUNTDOWN, BANK_OPTION
+} Bank;
+typedef enum { TYPE_FLOAT64, TYPE_INT32, TYPE_UINT64, TYPE_BOOLEAN, TYPE_CLOCK } Type;
 
 typedef struct {
     const char *name;
     Type type;
     Bank bank;
-    size_t index;          /* in its bank; for BANK_CLOCK the clock's index */
+    size_t index;          /* of its first element in its bank; for BANK_CLOCK the clock's index, for BANK_SIZE the length */
+    size_t size;           /* number of its elements */
     bool discrete;         /* variability discrete (inputs, outputs) */
     bool calculated;       /* its start value is computed by `start`, so it cannot be set */
 } ModelVariable;
@@ -40,6 +49,7 @@ typedef struct {
 typedef struct {
     const char *name;                  /* model name, for messages */
     const char *token;                 /* instantiation token */
+    bool co_simulation, model_exchange;    /* the kinds that the description offers */
     size_t n_states, n_discrete, n_inputs, n_parameters, n_outputs;
     size_t n_margins, n_times;         /* jump margins (without the flow set's), times */
     size_t n_jumps, n_clocks, n_variables;
@@ -54,6 +64,12 @@ typedef struct {
     ModelFunction margins;             /* -> jump margins (n_margins) */
     ModelFunction times;               /* -> absolute times of the time events (n_times) */
     ModelFunction outputs;             /* -> y (n_outputs) */
+    ModelReset reset;
+    /* Derivatives along directions; after t, x, z, u, p come the seeds.
+       forward: changes of t, x, z, u, p -> changes of dx/dt (n_states), y (n_outputs)
+       reverse: weights of dx/dt, y -> sensitivities to t, x, z, u, p
+       start_forward, start_reverse: the same of x0, z0 in place of dx/dt, y */
+    ModelFunction forward, reverse, start_forward, start_reverse;
     const ModelJump *jumps;            /* in the fixed order in which simultaneous ones are taken */
     const size_t *clock_jump;          /* n_clocks: the jump with which each clock ticks */
     const ModelVariable *variables;    /* value reference = index in this table; 0 is the time */

@@ -19,17 +19,21 @@
 /* Width (s) to which a crossing is located, never less than 2 ulp of the time: the shortest probe is half of it. */
 #define LOCATION_TOLERANCE 1e-16
 #define RELATIVE_TOLERANCE 1e-13
+#define RELATIVE_TOLERANCE_MOST 1e-10
 #define ABSOLUTE_TOLERANCE 1e-15
 #define LOOK_AHEAD_STEPS 20000
 #define LOOK_AHEAD_TIME 1e6
 #define ADVANCE_STEPS 1000000
+/* So many steps of the importer are looked ahead at once. */
+#define STEPS_AHEAD 64.0
 /* Jumps at one instant: of each jump on the state, and of the time events together, times their number. */
 #define JUMPS_AT_ONE_TIME 1000
 
 /* A point of the run.  time, step, x, z and level lie one after the other in memory, so one copy
    moves them all; step is the solver's proposal for the next step, 0 when there is none.  level is
    the margin from which on each guard is enabled: 0, or slightly below where a flow ended so shortly
-   before the crossing that it counts as reached. */
+   before the crossing that it counts as reached.  Its last entry is the margin of the flow set up to
+   which, under flow priority, the state is on the border: 0, or slightly above for the same reason. */
 typedef struct {
     double *time;
     double *step;
@@ -66,6 +70,7 @@ typedef struct {
     double jumps_time;            /* the time at which time_jumps_there counts */
     uint64_t time_jumps_there;
     uint64_t jumps_taken;         /* in the last advance */
+    int32_t settled;              /* nothing has changed from outside since the last advance */
     int32_t prediction;
     int32_t ending;
     char message[MESSAGE_SIZE];
@@ -91,23 +96,25 @@ struct Engine {
     double *w;
     Step step;
     double *probe_k[N_STAGES], *probe_x, *dense_x;
-    double *margins, *enabled, *times, *samples, *outputs;
+    double *margins, *enabled, *times, *samples;
+    double *outputs, *rates, *indicators;   /* of the view */
+    double *seeds[2];
     unsigned char *is_guard;      /* of each margin: some jump waits for it */
     Point reset, shown;           /* result of a reset map; what a view shows */
     View view;
-    bool has_outputs;
+    bool has_outputs, has_rates, has_indicators;
+    StepHook hook;
+    void *hook_context;
+    JumpHook jump_hook;
+    void *jump_context;
+    double target;                /* of the present advance */
     Ending problem;
     size_t suspect;               /* the state that the solver blames */
     char problem_message[MESSAGE_SIZE];
 };
 
-typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
-
-#if defined(__GNUC__)
-#define LIKE_PRINTF(text, first) __attribute__((format(printf, text, first)))
-#else
-#define LIKE_PRINTF(text, first)
-#endif
+/* CHANGED: the hook has set an input or a nearer target. */
+typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_CHANGED, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
 
 /* block.c */
 /* Notes why something cannot be done; always false, so that callers can return it. */
@@ -118,6 +125,9 @@ void copy_values(double *to, const double *from, size_t n);
 void copy_point(const Engine *engine, const Point *from, const Point *to);
 /* The values of a state for a message: "h = 0.1, v = -4.4". */
 const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size);
+
+/* The number of seeds in one of the engine's two places for them. */
+size_t seed_count(const Model *model);
 
 /* values.c */
 /* Evaluates a function of the model at (t, x, z) with the present inputs and parameters. */
@@ -163,6 +173,8 @@ FlowEnd locate_event(Engine *engine, const Point *point, double level, double pi
    the present step, if the flow could go on: neither a breakpoint nor the end of a run may hide a
    crossing that rounding puts behind it. */
 bool raise_levels(Engine *engine, const Point *point, double t);
+/* The same for the point itself, and for the border of the flow set under flow priority. */
+bool raise_levels_here(Engine *engine, const Point *point);
 
 /* zeno.c */
 /* Records a jump of the live point at its time; false if it is one too many. */

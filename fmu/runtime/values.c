@@ -22,20 +22,29 @@ void changed(Engine *engine)
 {
     *engine->live.step = 0.0;
     engine->status->prediction = PREDICTION_NONE;
+    engine->status->settled = false;
     engine->view = VIEW_NONE;
 }
 
 void engine_set_tolerance(Engine *engine, double relative)
 {
-    /* Below 1e-13 rounding would decide about steps. */
-    double tolerance = fmax(fmin(relative, RELATIVE_TOLERANCE), 1e-13);
+    /* Below the least rounding would decide about steps; above the greatest event times would suffer. */
+    double tolerance = fmax(fmin(1e-3 * relative, RELATIVE_TOLERANCE_MOST), RELATIVE_TOLERANCE);
     engine->status->relative_tolerance = tolerance;
     engine->status->absolute_tolerance = ABSOLUTE_TOLERANCE * (tolerance / RELATIVE_TOLERANCE);
+}
+
+/* Guards are enabled from zero on, wherever the importer goes. */
+static void clear_levels(Engine *engine)
+{
+    for (size_t i = 0; i <= engine->model->n_margins; i++)
+        engine->live.level[i] = 0.0;
 }
 
 void engine_set_time(Engine *engine, double t)
 {
     *engine->live.time = t;
+    clear_levels(engine);
     changed(engine);
 }
 
@@ -77,31 +86,66 @@ static bool show(Engine *engine, View view)
     return true;
 }
 
-const double *engine_values(Engine *engine, View view, Bank bank)
+void engine_set_states(Engine *engine, const double *x)
+{
+    copy_values(engine->live.x, x, engine->model->n_states);
+    clear_levels(engine);
+    changed(engine);
+}
+
+/* Computes the state that a view shows, once. */
+static bool hold_view(Engine *engine, View view)
+{
+    if (engine->view == view)
+        return true;
+    engine->view = VIEW_NONE;
+    engine->has_outputs = engine->has_rates = engine->has_indicators = false;
+    if (!show(engine, view))
+        return false;
+    engine->view = view;
+    return true;
+}
+
+static bool evaluate_view(Engine *engine, ModelFunction function, const char *what, double *result, bool *has)
 {
     const Point *shown = &engine->shown;
+    if (!*has && !evaluate(engine, function, *shown->time, shown->x, shown->z, result, NULL))
+        return problem(engine, ENDED_FAILED, "The %s of '%s' could not be evaluated at t = %.17g.", what,
+                       engine->model->name, *shown->time);
+    *has = true;
+    return true;
+}
+
+static bool indicators(Engine *engine)
+{
+    const Model *m = engine->model;
+    bool has_flow_set = engine->has_indicators || !m->has_flow_set;
+    return evaluate_view(engine, m->flow_set, "flow set", engine->indicators + m->n_margins, &has_flow_set) &&
+           evaluate_view(engine, m->margins, "jump sets", engine->indicators, &engine->has_indicators);
+}
+
+size_t engine_indicators(const Engine *engine)
+{
+    return engine->model->n_margins + (engine->model->has_flow_set ? 1 : 0);
+}
+
+const double *engine_values(Engine *engine, View view, Bank bank)
+{
+    const Model *m = engine->model;
     if (bank == BANK_INPUT)
         return engine->u;
     if (bank == BANK_PARAMETER)
         return engine->p;
-    if (engine->view != view) {
-        engine->view = VIEW_NONE;
-        engine->has_outputs = false;
-        if (!show(engine, view))
-            return NULL;
-        engine->view = view;
+    if (!hold_view(engine, view))
+        return NULL;
+    switch (bank) {
+    case BANK_STATE: return engine->shown.x;
+    case BANK_DISCRETE: return engine->shown.z;
+    case BANK_DERIVATIVE:
+        return evaluate_view(engine, m->flow, "flow map", engine->rates, &engine->has_rates) ? engine->rates : NULL;
+    case BANK_INDICATOR: return indicators(engine) ? engine->indicators : NULL;
+    default:
+        return evaluate_view(engine, m->outputs, "outputs", engine->outputs, &engine->has_outputs) ? engine->outputs
+                                                                                                 : NULL;
     }
-    if (bank == BANK_STATE)
-        return shown->x;
-    if (bank == BANK_DISCRETE)
-        return shown->z;
-    if (!engine->has_outputs) {
-        if (!evaluate(engine, engine->model->outputs, *shown->time, shown->x, shown->z, engine->outputs, NULL)) {
-            problem(engine, ENDED_FAILED, "The outputs of '%s' could not be evaluated at t = %.17g.",
-                    engine->model->name, *shown->time);
-            return NULL;
-        }
-        engine->has_outputs = true;
-    }
-    return engine->outputs;
 }

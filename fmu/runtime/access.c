@@ -1,0 +1,160 @@
+/* Values of variables that go in and out. */
+#include <math.h>
+
+#include "instance.h"
+
+static const char *type_name(Type type)
+{
+    static const char *const NAMES[] = {"Float64", "Int32", "UInt64", "Boolean", "Clock"};
+    return NAMES[type];
+}
+
+static bool may_be_set(const ModelVariable *variable, int mode)
+{
+    bool before_start = (mode & (MODE_INSTANTIATED | MODE_INITIALIZATION)) != 0;
+    switch (variable->bank) {
+    case BANK_INPUT: return mode != MODE_INTERMEDIATE || !variable->discrete;
+    case BANK_PARAMETER:
+    case BANK_OPTION: return before_start;
+    case BANK_STATE:
+    case BANK_DISCRETE: return before_start && !variable->calculated;
+    case BANK_SIZE: return mode == MODE_CONFIGURATION;
+    default: return false;
+    }
+}
+
+/* Checks the arguments of a getter or setter before anything is written. */
+static Answer check_access(const Instance *instance, const char *function, Type type, bool set,
+                           const Reference references[], size_t n, const void *values, size_t n_values)
+{
+    size_t needed = 0;
+    if (n > 0 && (!references || !values))
+        return null_argument(instance, function);
+    for (size_t i = 0; i < n; i++) {
+        if (references[i] >= model.n_variables)
+            return refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name,
+                          function, (unsigned long)references[i]);
+        const ModelVariable *variable = &model.variables[references[i]];
+        if (variable->type != type)
+            return refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.",
+                          instance->name, function, variable->name, type_name(variable->type));
+        if (set && !may_be_set(variable, instance->run->mode))
+            return refuse(instance, "%s: %s: '%s' cannot be set in the state '%s'.", instance->name, function,
+                          variable->name, mode_name(instance->run->mode));
+        needed += variable->size;
+    }
+    if (n_values != needed)
+        return refuse(instance, "%s: %s: %zu values were given room for, but the %zu variables have %zu.",
+                      instance->name, function, n_values, n, needed);
+    return ANSWER_OK;
+}
+
+View view_now(const Instance *instance)
+{
+    int mode = instance->run->mode;
+    if (mode & (MODE_INSTANTIATED | MODE_CONFIGURATION | MODE_INITIALIZATION))
+        return VIEW_START;
+    return mode == MODE_EVENT ? VIEW_PENDING : VIEW_LIVE;
+}
+
+/* The values of a variable's bank from its first element on; NULL (and one log line) if there are none. */
+static const double *elements(const Instance *instance, const ModelVariable *variable, double *own)
+{
+    const Run *run = instance->run;
+    switch (variable->bank) {
+    case BANK_TIME: *own = run->mode == MODE_INTERMEDIATE ? engine_time(instance->engine) : run->time; return own;
+    case BANK_SIZE: *own = (double)variable->index; return own;
+    case BANK_OPTION: *own = run->stop_at_events; return own;
+    default: break;
+    }
+    const double *values = engine_values(instance->engine, view_now(instance), variable->bank);
+    if (values)
+        return values + variable->index;
+    refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, variable->name,
+           engine_problem(instance->engine));
+    return NULL;
+}
+
+static bool fits(const ModelVariable *variable, double value)
+{
+    return isfinite(value) && (variable->type != TYPE_INT32 || fabs(value + 0.5) <= 2147483647.5);
+}
+
+/* Reads the elements of a variable; with no `store` it only checks that they can be read. */
+static Answer read_variable(const Instance *instance, const ModelVariable *variable, void *values, size_t at,
+                            StoreValue *store)
+{
+    double own;
+    const double *from = elements(instance, variable, &own);
+    if (!from)
+        return ANSWER_ERROR;
+    for (size_t k = 0; k < variable->size; k++) {
+        double value = variable->type == TYPE_INT32 ? floor(from[k] + 0.5) : from[k];
+        if (!fits(variable, value))
+            return refuse(instance, "%s: '%s' is %g at t = %.17g, which a value of type %s must not be. Remedy: check "
+                          "its expression, the parameters and the inputs.", instance->name, variable->name, from[k],
+                          instance->run->time, type_name(variable->type));
+        if (store)
+            store(values, at + k, value);
+    }
+    return ANSWER_OK;
+}
+
+Answer instance_get(void *handle, const char *function, Type type, const Reference references[], size_t n,
+                    void *values, size_t n_values, StoreValue *store)
+{
+    Instance *instance = enter(handle, function, MODE_ANY);
+    if (!instance || check_access(instance, function, type, false, references, n, values, n_values) != ANSWER_OK)
+        return ANSWER_ERROR;
+    for (size_t i = 0; i < n; i++)
+        if (read_variable(instance, &model.variables[references[i]], NULL, 0, NULL) != ANSWER_OK)
+            return ANSWER_ERROR;
+    for (size_t i = 0, at = 0; i < n; at += model.variables[references[i]].size, i++)
+        read_variable(instance, &model.variables[references[i]], values, at, store);
+    return ANSWER_OK;
+}
+
+static Answer check_value(const Instance *instance, const char *function, const ModelVariable *variable, double value)
+{
+    if (!isfinite(value))
+        return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, value,
+                      variable->name);
+    if (variable->bank == BANK_SIZE && value != (double)variable->index)
+        return refuse(instance, "%s: %s: the length '%s' is %zu in this FMU and cannot become %.0f. Remedy: export the "
+                      "model with that length.", instance->name, function, variable->name, variable->index, value);
+    return ANSWER_OK;
+}
+
+static void write_element(Instance *instance, const ModelVariable *variable, size_t k, double value)
+{
+    if (variable->bank == BANK_OPTION)
+        instance->run->stop_at_events = value != 0.0;
+    else if (variable->bank != BANK_SIZE)
+        engine_set(instance->engine, variable->bank, variable->index + k, value);
+}
+
+Answer instance_set(void *handle, const char *function, Type type, const Reference references[], size_t n,
+                    const void *values, size_t n_values, LoadValue *load)
+{
+    Instance *instance = enter(handle, function, MODE_SETTABLE);
+    if (!instance || check_access(instance, function, type, true, references, n, values, n_values) != ANSWER_OK)
+        return ANSWER_ERROR;
+    for (size_t i = 0, at = 0; i < n; i++)
+        for (size_t k = 0; k < model.variables[references[i]].size; k++)
+            if (check_value(instance, function, &model.variables[references[i]], load(values, at++)) != ANSWER_OK)
+                return ANSWER_ERROR;
+    for (size_t i = 0, at = 0; i < n; i++)
+        for (size_t k = 0; k < model.variables[references[i]].size; k++)
+            write_element(instance, &model.variables[references[i]], k, load(values, at++));
+    return ANSWER_OK;
+}
+
+Answer instance_no_type(void *handle, const char *function, size_t n, bool set)
+{
+    Instance *instance = enter(handle, function, set ? MODE_SETTABLE : MODE_ANY);
+    if (!instance)
+        return ANSWER_ERROR;
+    if (n == 0)
+        return ANSWER_OK;
+    return refuse(instance, "%s: %s: no variable of this FMU has that type.", instance->name, function);
+}

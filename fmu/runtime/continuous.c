@@ -1,0 +1,104 @@
+/* Model Exchange: the importer integrates, and says where. */
+#include <math.h>
+#include <string.h>
+
+#include "instance.h"
+
+static Instance *enter_exchange(void *handle, const char *function, int modes)
+{
+    Instance *instance = enter(handle, function, modes);
+    if (!instance || instance->interface == MODEL_EXCHANGE)
+        return instance;
+    refuse(instance, "%s: %s is for Model Exchange, but this is an instance for Co-Simulation.", instance->name,
+           function);
+    return NULL;
+}
+
+Answer instance_set_time(void *handle, const char *function, double time)
+{
+    Instance *instance = enter_exchange(handle, function, MODE_EVENT | MODE_CONTINUOUS);
+    if (!instance)
+        return ANSWER_ERROR;
+    if (!isfinite(time))
+        return refuse(instance, "%s: %s: the time %g must be finite.", instance->name, function, time);
+    if (time != instance->run->time)
+        engine_set_time(instance->engine, time);
+    instance->run->time = time;
+    return ANSWER_OK;
+}
+
+static Answer check_length(const Instance *instance, const char *function, const void *values, size_t n, size_t needed)
+{
+    if (n != needed)
+        return refuse(instance, "%s: %s: %zu values were given room for, but there are %zu.", instance->name, function,
+                      n, needed);
+    return n > 0 && !values ? null_argument(instance, function) : ANSWER_OK;
+}
+
+Answer instance_set_states(void *handle, const char *function, const double x[], size_t n)
+{
+    Instance *instance = enter_exchange(handle, function, MODE_CONTINUOUS);
+    if (!instance || check_length(instance, function, x, n, model.n_states) != ANSWER_OK)
+        return ANSWER_ERROR;
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(x[i]))
+            return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, x[i],
+                          model.state_names[i]);
+    engine_set_states(instance->engine, x);
+    return ANSWER_OK;
+}
+
+static const char *name_of(Bank bank, size_t i)
+{
+    if (bank == BANK_INDICATOR)
+        return i < model.n_margins ? model.margin_names[i] : "flow set";
+    return model.state_names[i];
+}
+
+Answer instance_get_vector(void *handle, const char *function, Bank bank, double values[], size_t n)
+{
+    Instance *instance = enter_exchange(handle, function, MODE_RUNNING);
+    if (!instance)
+        return ANSWER_ERROR;
+    Engine *engine = instance->engine;
+    size_t needed = bank == BANK_INDICATOR ? engine_indicators(engine) : model.n_states;
+    if (check_length(instance, function, values, n, needed) != ANSWER_OK)
+        return ANSWER_ERROR;
+    const double *from = engine_values(engine, view_now(instance), bank);
+    if (!from)
+        return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(from[i])) {
+            refuse(instance, "%s: %s: the value for '%s' is %g at t = %.17g, which is not finite. Remedy: a smaller "
+                   "step, or other parameters and inputs.",
+                   instance->name, function, name_of(bank, i), from[i], instance->run->time);
+            /* The importer may try a smaller step. */
+            return ANSWER_DISCARD;
+        }
+    if (n > 0)
+        memcpy(values, from, n * sizeof *values);
+    return ANSWER_OK;
+}
+
+Answer instance_nominals(void *handle, const char *function, double values[], size_t n)
+{
+    Instance *instance = enter_exchange(handle, function, MODE_ANY);
+    if (!instance || check_length(instance, function, values, n, model.n_states) != ANSWER_OK)
+        return ANSWER_ERROR;
+    for (size_t i = 0; i < n; i++)
+        values[i] = 1.0;
+    return ANSWER_OK;
+}
+
+Answer instance_completed_step(void *handle, const char *function, bool *event, bool *terminate)
+{
+    Instance *instance = enter_exchange(handle, function, MODE_CONTINUOUS);
+    if (!instance)
+        return ANSWER_ERROR;
+    if (!event || !terminate)
+        return null_argument(instance, function);
+    *terminate = false;
+    /* An importer that does not watch the indicators still does not pass an event unseen. */
+    *event = engine_pending(instance->engine) < model.n_jumps;
+    return ANSWER_OK;
+}

@@ -1,0 +1,68 @@
+/* Event Mode. */
+#include <math.h>
+
+#include "instance.h"
+
+Answer instance_enter_event_mode(void *handle, const char *function, int modes)
+{
+    Instance *instance = enter(handle, function, modes);
+    if (!instance)
+        return ANSWER_ERROR;
+    bool stepping = instance->interface == CO_SIMULATION;
+    if (stepping && !instance->event_mode_used)
+        return refuse(instance, "%s: %s: the FMU was instantiated with eventModeUsed = false.", instance->name,
+                      function);
+    if (!stepping && instance->run->mode == MODE_CONTINUOUS && !engine_arrive(instance->engine))
+        return refuse(instance, "%s: %s", instance->name, engine_problem(instance->engine));
+    instance->run->mode = MODE_EVENT;
+    return ANSWER_OK;
+}
+
+Answer instance_leave_event_mode(void *handle, const char *function, int mode)
+{
+    Instance *instance = enter(handle, function, MODE_EVENT);
+    if (!instance)
+        return ANSWER_ERROR;
+    if ((instance->interface == CO_SIMULATION) != (mode == MODE_STEP))
+        return refuse(instance, "%s: %s: an instance of this kind has no '%s'.", instance->name, function,
+                      mode_name(mode));
+    engine_clear_ticks(instance->engine);
+    instance->run->mode = mode;
+    return ANSWER_OK;
+}
+
+/* The time of the next event, if it can be known: predicted where all inputs are discrete, the next
+   time event otherwise.  Who integrates by himself needs to know the time events only, with those at which
+   the flow has a kink. */
+static bool next_event(const Instance *instance, double *event_time)
+{
+    Engine *engine = instance->engine;
+    if (instance->interface == MODEL_EXCHANGE)
+        return engine_next_time_event(engine, true, event_time);
+    return model.predictable ? engine_predict(engine, instance->run->stop_time, event_time)
+                             : engine_next_time_event(engine, false, event_time);
+}
+
+Answer instance_update(void *handle, const char *function, EventUpdate *update)
+{
+    Instance *instance = enter(handle, function, MODE_EVENT);
+    if (!instance)
+        return ANSWER_ERROR;
+    Engine *engine = instance->engine;
+    Run *run = instance->run;
+    bool changed = false;
+    *update = (EventUpdate){.terminate = !engine_jump(engine, &changed)};
+    update->states_changed = changed;
+    update->again = !update->terminate && engine_pending(engine) < model.n_jumps;
+    /* This iteration's clocks are over; the next one's are those of the jump that comes next. */
+    engine_clear_ticks(engine);
+    bool settled = !update->terminate && !update->again;
+    update->has_next = settled && next_event(instance, &update->next);
+    if (!update->has_next)
+        update->next = 0.0;
+    run->next_event = update->has_next && engine_foresees(engine) ? update->next : INFINITY;
+    run->interval_told = false;
+    if (update->terminate)
+        refuse(instance, "%s: %s", instance->name, engine_message(engine));
+    return ANSWER_OK;
+}

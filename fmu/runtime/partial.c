@@ -1,0 +1,130 @@
+/* Partial derivatives along directions, and derivatives of outputs with respect to time. */
+#include <math.h>
+
+#include "instance.h"
+
+/* Where a variable's derivatives lie; N_SEEDS if it is none that has any there. */
+static int place_of(const ModelVariable *variable, bool known)
+{
+    switch (variable->bank) {
+    case BANK_TIME: return known ? SEED_TIME : N_SEEDS;
+    case BANK_INPUT: return known ? SEED_INPUTS : N_SEEDS;
+    case BANK_PARAMETER: return known ? SEED_PARAMETERS : N_SEEDS;
+    case BANK_STATE: return known ? SEED_STATES : SEED_SHOWN;
+    case BANK_DISCRETE: return known ? SEED_DISCRETE : SEED_SHOWN + 1;
+    case BANK_DERIVATIVE: return known ? N_SEEDS : SEED_RATES;
+    case BANK_OUTPUT: return known ? N_SEEDS : SEED_OUTPUTS;
+    default: return N_SEEDS;
+    }
+}
+
+static Answer check_direction(const Instance *instance, const char *function, const Direction *direction, bool known)
+{
+    const void *values = direction->seeds ? (const void *)direction->seeds : direction->results;
+    size_t needed = 0;
+    if (direction->n > 0 && (!direction->references || !values))
+        return null_argument(instance, function);
+    for (size_t i = 0; i < direction->n; i++) {
+        Reference reference = direction->references[i];
+        if (reference >= model.n_variables)
+            return refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name,
+                          function, (unsigned long)reference);
+        const ModelVariable *variable = &model.variables[reference];
+        if (variable->type != TYPE_FLOAT64 || place_of(variable, known) == N_SEEDS)
+            return refuse(instance, "%s: %s: '%s' is none of the %s that derivatives are of.", instance->name,
+                          function, variable->name, known ? "knowns" : "unknowns");
+        needed += variable->size;
+    }
+    if (direction->n_values != needed)
+        return refuse(instance, "%s: %s: %zu values were given room for, but the %zu variables have %zu.",
+                      instance->name, function, direction->n_values, direction->n, needed);
+    for (size_t i = 0; i < needed; i++)
+        if (direction->seeds && !isfinite(direction->seeds[i]))
+            return refuse(instance, "%s: %s: the seed %g must be finite.", instance->name, function,
+                          direction->seeds[i]);
+    return ANSWER_OK;
+}
+
+/* Adds the seeds to their places. */
+static void scatter(const Direction *direction, bool known, double *const places[N_SEEDS])
+{
+    for (size_t i = 0, at = 0; i < direction->n; i++) {
+        const ModelVariable *variable = &model.variables[direction->references[i]];
+        for (size_t k = 0; k < variable->size; k++)
+            places[place_of(variable, known)][variable->index + k] += direction->seeds[at++];
+    }
+}
+
+static void gather(const Direction *direction, bool known, double *const places[N_SEEDS])
+{
+    for (size_t i = 0, at = 0; i < direction->n; i++) {
+        const ModelVariable *variable = &model.variables[direction->references[i]];
+        for (size_t k = 0; k < variable->size; k++)
+            direction->results[at++] = places[place_of(variable, known)][variable->index + k];
+    }
+}
+
+/* Where the derivatives are not finite, nothing is given. */
+static bool all_finite(const Direction *direction, bool known, double *const places[N_SEEDS])
+{
+    for (size_t i = 0; i < direction->n; i++) {
+        const ModelVariable *variable = &model.variables[direction->references[i]];
+        for (size_t k = 0; k < variable->size; k++)
+            if (!isfinite(places[place_of(variable, known)][variable->index + k]))
+                return false;
+    }
+    return true;
+}
+
+Answer instance_derivatives(void *handle, const char *function, const Direction *unknowns, const Direction *knowns,
+                            bool forward)
+{
+    Instance *instance = enter(handle, function, MODE_RUNNING);
+    double *places[N_SEEDS];
+    if (!instance || check_direction(instance, function, unknowns, false) != ANSWER_OK ||
+        check_direction(instance, function, knowns, true) != ANSWER_OK)
+        return ANSWER_ERROR;
+    Engine *engine = instance->engine;
+    const Direction *from = forward ? knowns : unknowns, *to = forward ? unknowns : knowns;
+    engine_seeds(engine, places);
+    scatter(from, forward, places);
+    bool done = forward ? engine_forward(engine, view_now(instance), places)
+                        : engine_reverse(engine, view_now(instance), places);
+    if (!done)
+        return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+    if (!all_finite(to, !forward, places)) {
+        refuse(instance, "%s: %s: the derivatives are not finite at t = %.17g.", instance->name, function,
+               instance->run->time);
+        return ANSWER_DISCARD;
+    }
+    gather(to, !forward, places);
+    return ANSWER_OK;
+}
+
+Answer instance_output_rates(void *handle, const char *function, const Reference references[], size_t n,
+                             const int32_t orders[], double values[], size_t n_values)
+{
+    Instance *instance = enter(handle, function, MODE_STEP | MODE_INTERMEDIATE | MODE_TERMINATED);
+    double *places[N_SEEDS];
+    const Direction wanted = {.references = references, .n = n, .results = values, .n_values = n_values};
+    if (!instance || check_direction(instance, function, &wanted, false) != ANSWER_OK)
+        return ANSWER_ERROR;
+    if (n > 0 && !orders)
+        return null_argument(instance, function);
+    for (size_t i = 0; i < n; i++)
+        if (orders[i] != 1)
+            return refuse(instance, "%s: %s: derivatives of order %ld are not computed, only the first.",
+                          instance->name, function, (long)orders[i]);
+    Engine *engine = instance->engine;
+    const double *rates = engine_values(engine, view_now(instance), BANK_DERIVATIVE);
+    if (!rates)
+        return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+    engine_seeds(engine, places);
+    *places[SEED_TIME] = 1.0;
+    for (size_t i = 0; i < model.n_states; i++)
+        places[SEED_STATES][i] = rates[i];
+    if (!engine_forward(engine, view_now(instance), places))
+        return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+    gather(&wanted, false, places);
+    return ANSWER_OK;
+}
