@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import shutil
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from fmpy import extract, read_model_description
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
@@ -45,11 +46,12 @@ class FmuSlave(Slave):
                 "export it as one."
             )
         self._variables = {variable.name: variable for variable in description.modelVariables}
+        self._elements = {name: place for v in description.modelVariables for name, place in _elements(v)}
         scalars = [v for v in description.modelVariables if v.type != "Clock"]
         super().__init__(
             name,
-            [_port(v) for v in scalars if v.causality == "input"],
-            [_port(v) for v in scalars if v.causality == "output"],
+            [port for v in scalars if v.causality == "input" for port in _ports(v)],
+            [port for v in scalars if v.causality == "output" for port in _ports(v)],
             [v.name for v in description.modelVariables if v.type == "Clock" and v.causality == "output"],
         )
         self.has_event_mode = bool(description.coSimulation.hasEventMode)
@@ -64,16 +66,16 @@ class FmuSlave(Slave):
         self._library: FMU3Slave | None = None
         self._fmu: FMU3Slave | None = None
         self._starts: dict[str, float] = {}
-        self._getters: dict[str, tuple[Callable[[list[int]], list[Any]], list[int]]] = {}
+        self._getters: dict[str, tuple[Callable[..., list[Any]], tuple[Any, ...], int]] = {}
 
     @property
     def variable_names(self) -> list[str]:
         """See `Slave.variable_names`."""
-        return list(self._variables)
+        return list(self._elements)
 
     def set(self, name: str, value: float) -> None:
         """See `Slave.set`."""
-        if name not in self._variables:
+        if name not in self._elements:
             raise self.unknown(name)
         if self._fmu is None:
             self._starts[name] = value
@@ -83,12 +85,13 @@ class FmuSlave(Slave):
     def get(self, name: str) -> float:
         """See `Slave.get`."""
         if name not in self._getters:
-            if name not in self._variables:
+            if name not in self._elements:
                 raise self.unknown(name)
-            variable = self._variables[name]
-            self._getters[name] = getattr(self._instance, f"get{variable.type}"), [variable.valueReference]
-        getter, reference = self._getters[name]
-        return float(self._call(getter, reference)[0])
+            whole, index = self._elements[name]
+            getter, arguments = self._getter(whole)
+            self._getters[name] = getter, arguments, index
+        getter, arguments, index = self._getters[name]
+        return float(self._call(getter, *arguments)[index])
 
     def load(self) -> FMU3Slave:
         """Load the FMU's binary, once for all runs; `start` does it if nobody has."""
@@ -169,10 +172,20 @@ class FmuSlave(Slave):
         active = self._call(self._instance.getClock, self._clock_references)
         return tuple(clock for clock, ticked in zip(self.clocks, active, strict=True) if ticked)
 
+    def _getter(self, whole: str) -> tuple[Callable[..., list[Any]], tuple[Any, ...]]:
+        variable = self._variables[whole]
+        return getattr(self._instance, f"get{variable.type}"), ([variable.valueReference], _size(variable))
+
     def _write(self, name: str, value: float) -> None:
-        variable = self._variables[name]
+        whole, index = self._elements[name]
+        variable = self._variables[whole]
         number = float(value) if variable.type.startswith("Float") else round(value)
-        self._call(getattr(self._instance, f"set{variable.type}"), [variable.valueReference], [number])
+        values = [number]
+        if variable.dimensions:
+            getter, arguments = self._getter(whole)
+            values = list(self._call(getter, *arguments))
+            values[index] = number
+        self._call(getattr(self._instance, f"set{variable.type}"), [variable.valueReference], values)
 
     def _call(self, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
         try:
@@ -196,5 +209,19 @@ def _unload(library: FMU3Slave, folder: str) -> None:
     shutil.rmtree(folder, ignore_errors=True)
 
 
-def _port(variable: Any) -> Port:
-    return Port(variable.name, variable.unit or "", variable.variability == "discrete")
+def _elements(variable: Any) -> Iterator[tuple[str, tuple[str, int]]]:
+    """Yield the scalars of a variable, counted from 1 row by row, with the place of each."""
+    if not variable.dimensions:
+        yield variable.name, (variable.name, 0)
+        return
+    for index, place in enumerate(np.ndindex(*variable.shape)):
+        yield f"{variable.name}[{','.join(str(i + 1) for i in place)}]", (variable.name, index)
+
+
+def _size(variable: Any) -> int:
+    return int(np.prod(variable.shape)) if variable.dimensions else 1
+
+
+def _ports(variable: Any) -> list[Port]:
+    discrete = variable.variability == "discrete"
+    return [Port(name, variable.unit or "", discrete) for name, _ in _elements(variable)]

@@ -85,7 +85,9 @@ def _number(value: float) -> str:
 
 def _array(kind: str, name: str, items: Iterable[str]) -> str:
     # C has no empty arrays: a table without entries gets one that is never read.
-    entries = list(items) or ["0" if "char" in kind or "size_t" in kind or "double" in kind or "Function" in kind else "{0}"]
+    entries = list(items) or [
+        "0" if "char" in kind or "size_t" in kind or "double" in kind or "Function" in kind else "{0}"
+    ]
     return f"static const {kind}{name}[] = {{\n    " + ",\n    ".join(entries) + "\n};\n"
 
 

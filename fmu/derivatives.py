@@ -21,8 +21,8 @@ def derivative_functions(traced: Trace) -> dict[str, ca.Function]:
     Returns
     -------
     dict of str to casadi.Function
-        ``forward``: seeds of t, x, z, u, p -> changes of dx/dt and y. ``reverse``: seeds of dx/dt and y -> sensitivities
-        to t, x, z, u, p. ``start_forward`` and ``start_reverse``: the same of the start values of x and z.
+        ``forward``: seeds of t, x, z, u, p -> changes of dx/dt and y. ``reverse``: seeds of dx/dt and y ->
+        sensitivities to t, x, z, u, p. ``start_forward`` and ``start_reverse``: the same of the start values.
     """
     sizes = [traced.flow.size1_in(k) for k in range(len(ARGUMENTS))]
     arguments = [ca.SX.sym(name, size) for name, size in zip(ARGUMENTS, sizes, strict=True)]

@@ -2,34 +2,38 @@
 
 from __future__ import annotations
 
-import enum
 import hashlib
 import tempfile
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
-from fmpy import platform_tuple, sharedLibraryExtension
-
-from fmu.build import RUNTIME, compile_fmu, fmi_headers, package, runtime_sources
+from fmu.archive import archive_content
+from fmu.build import RUNTIME, binaries, fmi_headers, package, runtime_sources
 from fmu.code import model_code
 from fmu.description import model_description, model_identifier
 from fmu.errors import ExportError
+from fmu.package import check_target
 from fmu.trace import trace
-from fmu.variables import fmu_variables
+from fmu.variables import Fmi, fmu_variables
 from hybrid_model import Automaton
 
-
-class Fmi(enum.Enum):
-    """Versions of the standard that FMUs are exported for."""
-
-    V3_0 = "3.0"
+KINDS = ("cs", "me")
+"""Co-Simulation and Model Exchange."""
 
 
 def export_fmu(
-    automaton: Automaton, path: str | Path, *, fmi: Fmi | str = Fmi.V3_0, stop_time: float | None = None
+    automaton: Automaton,
+    path: str | Path,
+    *,
+    fmi: Fmi | str = Fmi.V3_0,
+    kinds: Collection[str] = KINDS,
+    platforms: Sequence[str] | None = None,
+    stop_time: float | None = None,
+    step_size: float | None = None,
+    sources: bool = True,
+    progress: Callable[[str], None] | None = None,
 ) -> Path:
-    """Write an automaton as a Co-Simulation FMU with event mode, for this machine's platform.
-
-    The FMU holds compiled code only: it needs no Python to run.
+    """Write an automaton as an FMU: compiled code that needs no Python to run.
 
     Parameters
     ----------
@@ -38,9 +42,17 @@ def export_fmu(
     path : str or Path
         File to write; an existing one is replaced.
     fmi : Fmi or str
-        Version of the standard.
-    stop_time : float, optional
-        Default stop time in s that the description proposes.
+        Version of the standard: ``"2.0"`` or ``"3.0"``.
+    kinds : collection of str
+        ``"cs"`` for Co-Simulation, ``"me"`` for Model Exchange; one file holds both.
+    platforms : sequence of str, optional
+        Platforms that it is to run on, named as in FMI 3.0, such as ``x86_64-linux``; this machine's if not given.
+    stop_time, step_size : float, optional
+        Default stop time and communication step in s that the description proposes.
+    sources : bool
+        Whether the archive holds the C sources as well.
+    progress : callable, optional
+        Told in a few words what is being done.
 
     Returns
     -------
@@ -50,32 +62,62 @@ def export_fmu(
     Raises
     ------
     ExportError
-        If a map cannot be traced, a name is taken twice, or the version is unknown.
+        If a map cannot be traced, a name is taken twice, or an option is unknown.
     fmu.build.BuildError
-        If there is no C compiler or the code does not compile.
+        If there is no C compiler, the code does not compile, or the file cannot be written.
     """
-    _require_version(fmi)
+    version, target = _version(fmi), Path(path)
+    chosen = _kinds(kinds)
+    check_target(target)
     traced = trace(automaton)
-    variables = fmu_variables(traced)
-    # The token ties description and binary together: it changes when either does.
-    unsigned = model_description(traced, variables, "", stop_time) + model_code(traced, variables, "").encode()
-    runtime = b"".join(source.read_bytes() for source in sorted(RUNTIME.iterdir()) if source.suffix in (".c", ".h"))
-    token = hashlib.sha256(unsigned + runtime).hexdigest()[:32]
-    identifier = model_identifier(automaton.name)
+    variables = fmu_variables(traced, version)
+    runtime = runtime_sources(version.value)
+
+    # The token ties description and code together: it changes when either does.
+    unsigned = [model_description(traced, variables, "", fmi=version, kinds=chosen).decode()]
+    unsigned += [model_code(traced, variables, "", chosen), *map(Path.read_text, [*runtime, *_headers()])]
+    token = hashlib.sha256("".join(unsigned).encode()).hexdigest()[:32]
+    code = model_code(traced, variables, token, chosen)
+    members = archive_content(
+        traced,
+        variables,
+        token,
+        code,
+        fmi=version,
+        kinds=chosen,
+        stop_time=stop_time,
+        step_size=step_size,
+        sources=sources,
+    )
     with tempfile.TemporaryDirectory() as folder:
-        work = Path(folder)
-        generated = work / "model.c"
-        generated.write_text(model_code(traced, variables, token), encoding="ascii")
-        binary = work / f"{identifier}{sharedLibraryExtension}"
-        compile_fmu([generated, *runtime_sources()], [fmi_headers()], binary)
-        members = {
-            "modelDescription.xml": model_description(traced, variables, token, stop_time),
-            f"binaries/{platform_tuple}/{binary.name}": binary.read_bytes(),
-        }
-        return package(members, Path(path))
+        generated = Path(folder) / "model.c"
+        generated.write_text(code, encoding="ascii")
+        identifier = model_identifier(automaton.name)
+        members |= binaries(
+            [generated, *runtime],
+            [fmi_headers()],
+            identifier,
+            fmi=version.value,
+            platforms=platforms,
+            progress=progress,
+        )
+    return package(members, target)
 
 
-def _require_version(fmi: Fmi | str) -> None:
-    known = [version.value for version in Fmi]
-    if (fmi.value if isinstance(fmi, Fmi) else fmi) not in known:
-        raise ExportError(f"FMI version {fmi!r} is not one that can be exported: choose from {', '.join(known)}.")
+def _headers() -> list[Path]:
+    return sorted(RUNTIME.glob("*.h"))
+
+
+def _version(fmi: Fmi | str) -> Fmi:
+    try:
+        return Fmi(fmi)
+    except ValueError:
+        known = ", ".join(version.value for version in Fmi)
+        raise ExportError(f"FMI version {fmi!r} is not one that can be exported: choose from {known}.") from None
+
+
+def _kinds(kinds: Collection[str]) -> tuple[str, ...]:
+    chosen = tuple(kind for kind in KINDS if kind in kinds)
+    if isinstance(kinds, str) or len(chosen) != len(set(kinds)) or not chosen:
+        raise ExportError(f"The kinds {kinds!r} are not kinds of FMU: give one or both of {', '.join(KINDS)}.")
+    return chosen

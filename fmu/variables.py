@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 from fmu.errors import ExportError
 from fmu.trace import Trace
+from fmu.units import unit_per_second
 from hybrid_model import Automaton
 from hybrid_model.layout import Layout, Place
 from hybrid_model.transitions import Trigger
@@ -226,19 +227,10 @@ def _derivative(state: FmuVariable) -> FmuVariable:
         causality="local",
         initial="calculated",
         start=None,
-        unit=_per_second(state.unit),
+        unit=unit_per_second(state.unit),
         description=f"time derivative of {state.name}",
         derivative_of=state.name,
     )
-
-
-def _per_second(unit: str) -> str:
-    """Return the unit of a time derivative in FMI's notation: at most one fraction line."""
-    above, _, below = unit.partition("/")
-    powers = {"": "s", "s": "s2", "s2": "s3"}
-    if not unit:
-        return ""
-    return f"{above}/{powers[below]}" if below in powers else f"{above}/({below.strip('()')}.s)"
 
 
 def _margins(automaton: Automaton) -> Iterator[FmuVariable]:

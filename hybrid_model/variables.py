@@ -149,9 +149,7 @@ class Declaration:
         start = np.full(shape, given) if given.shape == () else given
         if self.traits.get("integer") and not np.all(start == np.round(start)):
             raise DeclarationError(f"{owner}.{name} holds whole numbers, but its start value is {start}: round it.")
-        return Variable(
-            name, self.kind, start, self.unit, self.description, **self.traits, dimensions=self.shape
-        )
+        return Variable(name, self.kind, start, self.unit, self.description, **self.traits, dimensions=self.shape)
 
 
 def start_array(name: str, value: npt.ArrayLike) -> FloatArray:

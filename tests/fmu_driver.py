@@ -5,6 +5,8 @@ end are the ways in which importers run an FMU.
 """
 
 import ctypes as c
+import itertools
+import math
 import random
 from pathlib import Path
 from typing import NamedTuple
@@ -12,7 +14,7 @@ from typing import NamedTuple
 import fmpy
 
 OK, ERROR = 0, 3
-TYPES = {"Float64": c.c_double, "Int32": c.c_int32, "Boolean": c.c_bool, "Clock": c.c_bool}
+TYPES = {"Float64": c.c_double, "Int32": c.c_int32, "UInt64": c.c_uint64, "Boolean": c.c_bool, "Clock": c.c_bool}
 LOGGER = c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p)
 
 
@@ -46,11 +48,12 @@ class Library:
             fmpy.extract(str(path), str(self.folder))
         self.token = self.description.instantiationToken.encode()
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
-        self.clocks = [name for name, variable in self.variables.items() if variable.type == "Clock"]
+        self.clocks = [n for n, v in self.variables.items() if v.type == "Clock" and v.causality == "output"]
+        self.elements = {name: place for v in self.description.modelVariables for name, place in elements(v)}
         self.outputs = [
             name for name, v in self.variables.items() if v.causality == "output" and v.type in ("Float64", "Int32")
         ]
-        self.scalars = [name for name, variable in self.variables.items() if variable.type != "Clock"]
+        self.scalars = [name for name, (whole, _) in self.elements.items() if self.variables[whole].type != "Clock"]
         [binary] = (self.folder / "binaries").rglob(f"*{fmpy.sharedLibraryExtension}")
         self.functions = c.CDLL(str(binary))
         self.functions.fmi3InstantiateCoSimulation.restype = c.c_void_p
@@ -58,6 +61,14 @@ class Library:
 
     def reference(self, name):
         return self.variables[name].valueReference
+
+
+def elements(variable):
+    """The names of a variable's scalars, counted from 1 row by row, with its own name and their places in it."""
+    if not variable.dimensions:
+        return [(variable.name, (variable.name, 0))]
+    indices = itertools.product(*(range(1, n + 1) for n in variable.shape))
+    return [(f"{variable.name}[{','.join(map(str, i))}]", (variable.name, k)) for k, i in enumerate(indices)]
 
 
 class Instance:
@@ -124,15 +135,23 @@ class Instance:
         return status, list(array)
 
     def get(self, name):
-        status, values = self.access("Get", self.library.variables[name].type, [self.library.reference(name)], [0])
+        whole, index = self.library.elements[name]
+        status, values = self.whole("Get", whole)
         assert status == OK, (name, self.messages)
-        return values[0]
+        return values[index]
 
     def set(self, name, value):
-        kind = self.library.variables[name].type
-        number = round(value) if kind == "Int32" else value
-        status, _ = self.access("Set", kind, [self.library.reference(name)], [number])
+        whole, index = self.library.elements[name]
+        values = [value] if "[" not in name or whole == name else self.whole("Get", whole)[1]
+        values[index] = round(value) if self.library.variables[whole].type == "Int32" else value
+        status, _ = self.whole("Set", whole, values)
         assert status == OK, (name, value, self.messages)
+
+    def whole(self, function, name, values=None):
+        """Get or set a variable with all its elements."""
+        variable = self.library.variables[name]
+        values = [0] * math.prod(variable.shape or ()) if values is None else values
+        return self.access(function, variable.type, [variable.valueReference], values)
 
     def values(self):
         """All values but the clocks', by name."""

@@ -104,6 +104,8 @@ static size_t lay_out_block(Engine *engine, unsigned char *memory)
     engine->p = take(&cursor, m->n_parameters * sizeof(double));
     engine->history = take(&cursor, m->n_jumps * sizeof(JumpHistory));
     engine->ticked = take(&cursor, m->n_clocks);
+    for (size_t i = 0; i < N_SEGMENT; i++)
+        engine->segment[i] = take(&cursor, m->n_states * sizeof(double));
     return cursor.used;
 }
 

@@ -42,8 +42,7 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
 {
     double end = fmin(limit, piece_end);
     double level = 0.0;
-    for (size_t i = 0; i <= engine->model->n_margins; i++)
-        point->level[i] = 0.0;
+    clear_levels(engine, point);
     if (!step_begin(engine, point) || (locate && !flow_may_begin(engine, point, &level)))
         return FLOW_PROBLEM;
     while (*point->time < end) {
@@ -177,6 +176,29 @@ static void flow_past_event(Engine *engine, double target)
         copy_point(engine, &engine->shown, &engine->live);
 }
 
+/* Follows the solver's own steps to the target where nothing is to happen up to `quiet_until`: a target within
+   a step is read from its interpolation.  False if a step fails; the live point is then at the start of that step. */
+static bool follow_steps(Engine *engine, double target, double quiet_until)
+{
+    Status *status = engine->status;
+    while (!status->has_segment || target >= status->segment_end) {
+        if (status->has_segment)
+            segment_read(engine, status->segment_end);
+        status->has_segment = false;
+        if (!take_internal_jumps(engine, &engine->live))
+            return false;
+        if (*engine->live.time >= target)
+            return true;
+        clear_levels(engine, &engine->live);
+        double limit = fmin(quiet_until, next_time(engine, &engine->live, false, true));
+        if (!step_begin(engine, &engine->live) || !step_accept(engine, &engine->live, limit))
+            return false;
+        segment_keep(engine);
+    }
+    segment_read(engine, target);
+    return true;
+}
+
 typedef enum { ON_THE_WAY, AT_PREDICTED_EVENT, NOT_PREDICTED } Progress;
 
 /* Uses the prediction, if there is one, as far as it carries. */
@@ -188,9 +210,12 @@ static Progress follow_prediction(Engine *engine, size_t *budget, FlowEnd *end)
     if (prediction == PREDICTION_NONE)
         return NOT_PREDICTED;
     if (quiet ? target <= event : target < event - 4.0 * time_ulp(event)) {
-        *end = flow(engine, &engine->live, target, false, budget);
+        /* A hook wants to see each step, so none may go beyond the target. */
+        if (engine->hook || !follow_steps(engine, target, event))
+            *end = flow(engine, &engine->live, target, false, budget);
         return ON_THE_WAY;
     }
+    engine->status->has_segment = false;
     engine->status->prediction = PREDICTION_NONE;
     if (quiet)
         return NOT_PREDICTED;
@@ -219,6 +244,8 @@ static Advance advance_locating(Engine *engine, double start, EventPolicy policy
         *budget -= *budget > 0;
         if (!engine_jump_all(engine))
             return ADVANCE_ENDED;
+        /* A jump of its own is no surprise. */
+        engine->status->settled = true;
         double now = *engine->live.time;
         if (policy == EVENTS_STOP_AFTER && now > start && engine->target - now > event_tolerance(now))
             return ADVANCE_EVENT_BEFORE;

@@ -237,6 +237,33 @@ static void prepare_dense(Engine *engine)
     step->has_dense = true;
 }
 
+void segment_keep(Engine *engine)
+{
+    Step *step = &engine->step;
+    Status *status = engine->status;
+    size_t n = engine->model->n_states;
+    if (!step->has_dense)
+        prepare_dense(engine);
+    copy_values(engine->segment[0], step->x0, n);
+    for (size_t i = 0; i < n; i++)
+        engine->segment[1][i] = step->x1[i] - step->x0[i];
+    for (size_t k = 0; k < 3; k++)
+        copy_values(engine->segment[2 + k], step->dense[k], n);
+    status->segment_begin = step->t0;
+    status->segment_end = step->t1;
+    status->has_segment = true;
+}
+
+void segment_read(Engine *engine, double t)
+{
+    const Status *status = engine->status;
+    double *const *of = engine->segment;
+    double a = (t - status->segment_begin) / (status->segment_end - status->segment_begin), b = 1.0 - a;
+    *engine->live.time = t;
+    for (size_t i = 0; i < engine->model->n_states; i++)
+        engine->live.x[i] = of[0][i] + a * (of[1][i] + b * (of[2][i] + a * (of[3][i] + b * of[4][i])));
+}
+
 void step_dense(Engine *engine, double t)
 {
     Step *step = &engine->step;

@@ -9,6 +9,7 @@
 #define N_STAGES 7            /* Dormand-Prince 5(4) */
 #define N_SAMPLES 9           /* of each margin, where a step is looked at for crossings */
 #define N_ZENO_TIMES 12       /* remembered times of each jump */
+#define N_SEGMENT 5           /* vectors that give the state on a step: at its start, its change, its curvature (3) */
 #define MESSAGE_SIZE 768
 
 /* Guards that cross within this time (s) are simultaneous.  A state outside the flow set by less
@@ -70,6 +71,9 @@ typedef struct {
     double jumps_time;            /* the time at which time_jumps_there counts */
     uint64_t time_jumps_there;
     uint64_t jumps_taken;         /* in the last advance */
+    /* The live point lies on a step of the solver that goes on to segment_end. */
+    double segment_begin, segment_end;
+    int32_t has_segment;
     int32_t settled;              /* nothing has changed from outside since the last advance */
     int32_t prediction;
     int32_t ending;
@@ -88,6 +92,7 @@ struct Engine {
     double *u, *p;
     JumpHistory *history;
     unsigned char *ticked;
+    double *segment[N_SEGMENT];
     /* Scratch: nothing here outlives a call, except the cache of a view. */
     unsigned char *scratch;
     const double **arg;
@@ -133,6 +138,8 @@ size_t seed_count(const Model *model);
 /* Evaluates a function of the model at (t, x, z) with the present inputs and parameters. */
 bool evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
               double *second);
+/* Guards are enabled from zero on. */
+void clear_levels(const Engine *engine, const Point *point);
 /* Something that the future depends on has changed. */
 void changed(Engine *engine);
 
@@ -157,6 +164,10 @@ void step_commit(Engine *engine, const Point *point);
 bool step_probe(Engine *engine, const Point *point, double t);
 /* The interpolation of the present step: engine->dense_x. */
 void step_dense(Engine *engine, double t);
+/* Keeps the present step as a segment on which the live point moves. */
+void segment_keep(Engine *engine);
+/* Moves the live point along the segment. */
+void segment_read(Engine *engine, double t);
 
 /* sets.c */
 double event_tolerance(double t);

@@ -3,6 +3,12 @@
 
 #include "parts.h"
 
+void clear_levels(const Engine *engine, const Point *point)
+{
+    for (size_t i = 0; i <= engine->model->n_margins; i++)
+        point->level[i] = 0.0;
+}
+
 bool evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
               double *second)
 {
@@ -23,6 +29,7 @@ void changed(Engine *engine)
     *engine->live.step = 0.0;
     engine->status->prediction = PREDICTION_NONE;
     engine->status->settled = false;
+    engine->status->has_segment = false;
     engine->view = VIEW_NONE;
 }
 
@@ -34,17 +41,10 @@ void engine_set_tolerance(Engine *engine, double relative)
     engine->status->absolute_tolerance = ABSOLUTE_TOLERANCE * (tolerance / RELATIVE_TOLERANCE);
 }
 
-/* Guards are enabled from zero on, wherever the importer goes. */
-static void clear_levels(Engine *engine)
-{
-    for (size_t i = 0; i <= engine->model->n_margins; i++)
-        engine->live.level[i] = 0.0;
-}
-
 void engine_set_time(Engine *engine, double t)
 {
     *engine->live.time = t;
-    clear_levels(engine);
+    clear_levels(engine, &engine->live);
     changed(engine);
 }
 
@@ -89,7 +89,7 @@ static bool show(Engine *engine, View view)
 void engine_set_states(Engine *engine, const double *x)
 {
     copy_values(engine->live.x, x, engine->model->n_states);
-    clear_levels(engine);
+    clear_levels(engine, &engine->live);
     changed(engine);
 }
 

@@ -52,9 +52,9 @@ EXPECTED = {
     "GetFMUState": ((c.byref(c.c_void_p()),), set(MODES)),
     "SetFMUState": ((NONE,), set()),
     "FreeFMUState": ((NONE,), set(MODES)),
-    # What this FMU does not have, it does not have in any mode.
-    "EnterConfigurationMode": ((), set()),
+    "EnterConfigurationMode": ((), {"instantiated"}),
     "ExitConfigurationMode": ((), set()),
+    # What this FMU does not have, or not for Co-Simulation, it does not have in any mode.
     "EvaluateDiscreteStates": ((), set()),
     "EnterContinuousTimeMode": ((), set()),
     "SetTime": ((ONE,), set()),
