@@ -31,7 +31,9 @@ def find_compiler() -> list[str]:
     BuildError
         If ``CC`` names no executable, or if there is no compiler at all.
     """
-    chosen = os.environ.get("CC", "").split()
+    value = os.environ.get("CC", "").strip()
+    # A path may hold blanks; otherwise they separate arguments.
+    chosen = [value] if value and shutil.which(value) else value.split()
     if chosen:
         if shutil.which(chosen[0]) is None:
             raise BuildError(

@@ -205,6 +205,23 @@ def test_an_interrupt_stops_the_compilers_and_leaves_nothing(tmp_path):
             os.kill(int(pid), 0)
 
 
+@posix
+def test_the_first_error_stops_the_other_compilers(tmp_path, monkeypatch):
+    script = tmp_path / "a compiler"
+    script.write_text(
+        f'#!/bin/sh\ncase "$*" in *--version*) exit 0;; *bad.c*) echo wrong; exit 1;; esac\n'
+        f'sleep 20\ntouch "{tmp_path}/went-on"\n'
+    )
+    script.chmod(0o755)
+    monkeypatch.setenv("CC", str(script))
+    monkeypatch.setattr("fmu.jobs._processors", lambda: 2)
+    for name in ("slow.c", "bad.c"):
+        (tmp_path / name).write_text("int x;\n")
+    with pytest.raises(BuildError, match=r"(?s)compile 'bad.c'.*wrong"):
+        compile_fmu([tmp_path / "slow.c", tmp_path / "bad.c"], [], tmp_path / "Model.so")
+    assert not (tmp_path / "went-on").exists()
+
+
 # ---- names and places ----
 
 
