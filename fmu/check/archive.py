@@ -107,7 +107,7 @@ class Archive:
             self._file.close()
             raise
         self.prefixed = bool(self._zip.infolist()) and min(m.header_offset for m in self._zip.infolist()) > 0
-        self._members = {member.filename: member for member in self._zip.infolist() if not member.is_dir()}
+        self._members = {member.filename: member for member in self._zip.infolist() if not _is_folder(member)}
 
     def __enter__(self) -> Archive:
         return self
@@ -257,7 +257,7 @@ def _member_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator
             "compression",
             f"The member {shown} has compression method {member.compress_type}; FMI allows 0 (store) and 8 (deflate).",
         )
-    if member.is_dir() and member.file_size:
+    if _is_folder(member) and member.file_size:
         yield "folder", f"The folder {shown} holds {member.file_size} bytes; a folder holds none."
     if member.file_size > limits.ratio_from and member.file_size > limits.ratio * max(member.compress_size, 1):
         ratio = member.file_size / max(member.compress_size, 1)
@@ -266,6 +266,10 @@ def _member_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator
             f"The member {shown} unpacks {ratio:.0f}-fold to {member.file_size} bytes; "
             f"at most {limits.ratio:g}-fold is accepted: it looks like a decompression bomb.",
         )
+
+
+def _is_folder(member: zipfile.ZipInfo) -> bool:
+    return member.filename.endswith("/")  # `ZipInfo.is_dir` fails on an empty name
 
 
 def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[tuple[str, str]]:
@@ -291,7 +295,7 @@ def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[tuple[str, str]]:
             folders.update("/".join(parts[:depth]) for depth in range(1, len(parts)))
         else:
             yield "deep", f"The member {name[:120]!r} lies {len(parts)} folders deep; at most 64 are accepted."
-        if not member.is_dir():
+        if not _is_folder(member):
             files.add(key)
     for key in sorted(files & folders):
         yield "duplicate", f"The member {key[:120]!r} is a file and a folder at once."

@@ -161,13 +161,12 @@ def _symbols(
     if other:
         shown = ", ".join(quoted(symbol, 40) for symbol in other[:6])
         more = f" and {len(other) - 6} more" if len(other) > 6 else ""
-        yield warning(
-            "symbol.exported",
-            f"{name} exports {shown}{more} beside the FMI functions: a function of that name in the host may "
-            "be called instead. "
-            "Compile with -fvisibility=hidden.",
-            INTERPOSITION,
-        )
+        beside = f"{name} exports {shown}{more} beside the FMI functions"
+        if binary.system == "linux":
+            text = "a function of that name in the host may be called instead. Compile with -fvisibility=hidden."
+            yield warning("symbol.exported", f"{beside}: {text}", INTERPOSITION)
+        else:  # names are looked up library by library
+            yield note("symbol.exported", f"{beside}.")
     for runtime, pattern in _RUNTIMES.items():
         wanted = sorted(symbol for symbol in binary.imports if pattern.fullmatch(symbol))
         if wanted:

@@ -63,7 +63,9 @@ def _build_description(archive: Archive, description: Description) -> Iterator[F
     names = set(archive.names)
     if _BUILD not in names:
         if description.major == 3 and any(name.startswith("sources/") for name in names):
-            yield error(
+            # Beside binaries, as an addition that nobody needs, they do less harm.
+            judged = warning if any(name.startswith("binaries/") for name in names) else error
+            yield judged(
                 "source.description", f"There are sources but no {_BUILD}: no importer can compile them.", SOURCES
             )
         return

@@ -30,6 +30,9 @@ from fmu.check.child.experiments import main
 sys.exit(main(sys.argv[2]))
 """
 _LARGEST_ARRAY = 1_000_000
+_JACOBIAN = 20
+"""Rows and columns of the Jacobian that are asked for."""
+_DIRECTIONAL = ("providesDirectionalDerivative", "providesDirectionalDerivatives")
 
 
 @dataclass(frozen=True)
@@ -98,6 +101,9 @@ def _experiments(kind: str, attributes: Any) -> list[str]:
         experiments.append("state")
     if kind == "CoSimulation":
         experiments.append("bad_steps")
+    directional = any(true(attributes, name) for name in _DIRECTIONAL)
+    if kind != "ScheduledExecution" and (directional or attributes.get("maxOutputDerivativeOrder", "0") != "0"):
+        experiments.append("derivatives")
     return experiments
 
 
@@ -134,6 +140,9 @@ def _plan(
             if description.major == 2
             else sum(description.size(indicator) or 0 for indicator in indicators if indicator is not None)
         ),
+        "jacobian": _jacobian(description) if any(true(attributes, name) for name in _DIRECTIONAL) else [],
+        "adjoint": true(attributes, "providesAdjointDerivatives"),
+        "output_derivatives": _differentiable_outputs(description, attributes),
         "start": start,
         "stop": stop,
         "step": step,
@@ -161,6 +170,37 @@ def _entry(description: Description, kind: str, variable: Variable) -> list[Any]
     readable = fits and variable.type != "Clock" and not variable.clocks
     start = list(variable.start or ()) if settable and fits else None
     return [variable.name, variable.reference, variable.type, size if fits else 0, variable.causality, start, readable]
+
+
+def _jacobian(description: Description) -> list[list[Any]]:
+    """Return some unknowns, each with its value reference and those of the inputs and states it depends on."""
+    derivatives = [description.referred(u.reference) for u in description.structure["derivatives"]]
+    states = {d.derivative for d in derivatives if d is not None and d.derivative is not None}
+    rows: list[list[Any]] = []
+    for unknown in (*description.structure["derivatives"], *description.structure["outputs"]):
+        variable = description.referred(unknown.reference)
+        if variable is None or not _is_smooth_scalar(variable):
+            continue
+        knowns = []
+        for number in unknown.dependencies or ():
+            known = description.referred(number)
+            if known is not None and (number in states or known.causality == "input") and _is_smooth_scalar(known):
+                knowns.append(known.reference)
+        if knowns:
+            rows.append([variable.name, variable.reference, knowns[:_JACOBIAN]])
+    return rows[:_JACOBIAN]
+
+
+def _differentiable_outputs(description: Description, attributes: Any) -> list[int]:
+    if attributes.get("maxOutputDerivativeOrder", "0") == "0":
+        return []
+    outputs = [v for v in description.variables if v.causality == "output" and _is_smooth_scalar(v)]
+    return [variable.reference for variable in outputs[:_JACOBIAN]]
+
+
+def _is_smooth_scalar(variable: Variable) -> bool:
+    double = variable.type in ("Real", "Float64") and not variable.dimensions and not variable.clocks
+    return double and variable.variability == "continuous"
 
 
 def _times(description: Description, attributes: Any) -> tuple[float, float, float, int]:

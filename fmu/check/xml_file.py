@@ -82,7 +82,10 @@ def parse(content: bytes, name: str, limits: XmlLimits = LIMITS) -> etree._Eleme
     try:
         root = etree.fromstring(content, parser)
     except (etree.XMLSyntaxError, ValueError) as problem:
-        raise _refused("syntax", f"{name} is not well-formed XML: {problem}.") from problem
+        raise _refused(
+            "syntax",
+            f"{name} is not well-formed XML: {problem.msg if isinstance(problem, etree.XMLSyntaxError) else problem}.",
+        ) from problem
     return root
 
 

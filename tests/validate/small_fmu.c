@@ -134,6 +134,14 @@ static int put_back(State* s, const State* from) {
     return OK;
 }
 
+/* d y / d x = 1; d der(x) / d x = -rate. */
+static double slope(const State* s, unsigned unknown) {
+#ifdef FAULT_DERIVATIVE_NAN
+    return NAN;
+#endif
+    return unknown == 2 ? -s->rate : 1.0;
+}
+
 #ifdef FAULT_SYMBOLS
 API double gamma(double v) { return v; }
 #endif
@@ -214,6 +222,41 @@ API int fmi3DeserializeFMUState(State* s, const uint8_t* in, size_t n, void** ou
 #endif
     return OK;
 }
+API int fmi3GetDirectionalDerivative(State* s, const uint32_t r[], size_t n, const uint32_t k[], size_t nk, const double seed[],
+                                     size_t ns, double out[], size_t no) {
+    (void)k; (void)ns; (void)no;
+    for (size_t i = 0; i < n; i++) {
+        out[i] = 0.0;
+        for (size_t j = 0; j < nk; j++) out[i] += slope(s, r[i]) * seed[j];
+#ifdef FAULT_DERIVATIVE_REFUSED
+        return ERROR;
+#endif
+    }
+    return OK;
+}
+API int fmi3GetAdjointDerivative(State* s, const uint32_t r[], size_t n, const uint32_t k[], size_t nk, const double seed[],
+                                 size_t ns, double out[], size_t no) {
+    (void)k; (void)ns; (void)no;
+    for (size_t j = 0; j < nk; j++) {
+        out[j] = 0.0;
+        for (size_t i = 0; i < n; i++) out[j] += slope(s, r[i]) * seed[i];
+#ifdef FAULT_ADJOINT
+        out[j] = -out[j];
+#endif
+    }
+    return OK;
+}
+API int fmi3GetOutputDerivatives(State* s, const uint32_t r[], size_t n, const int32_t orders[], double out[], size_t no) {
+    (void)r; (void)no;
+    for (size_t i = 0; i < n; i++) {
+        if (orders[i] != 1) return ERROR;
+        get(s, 2, out + i);
+#ifdef FAULT_OUTPUT_DERIVATIVE
+        out[i] = NAN;
+#endif
+    }
+    return OK;
+}
 API int fmi3EnterContinuousTimeMode(State* s) { (void)s; return OK; }
 API int fmi3SetTime(State* s, double t) { s->t = t; return OK; }
 API int fmi3SetContinuousStates(State* s, const double x[], size_t n) { (void)n; s->x = x[0]; return OK; }
@@ -276,6 +319,26 @@ API int fmi2FreeFMUstate(State* s, void** state) { (void)s; free(*state); *state
 API int fmi2SerializedFMUstateSize(State* s, void* state, size_t* n) { (void)s; (void)state; *n = sizeof(State); return OK; }
 API int fmi2SerializeFMUstate(State* s, void* state, char* out, size_t n) { (void)s; memcpy(out, state, n); return OK; }
 API int fmi2DeSerializeFMUstate(State* s, const char* in, size_t n, void** out) { copy(s, out); memcpy(*out, in, n); return OK; }
+API int fmi2GetDirectionalDerivative(State* s, const unsigned r[], size_t n, const unsigned k[], size_t nk, const double seed[],
+                                     double out[]) {
+    (void)k;
+    for (size_t i = 0; i < n; i++) {
+        out[i] = 0.0;
+        for (size_t j = 0; j < nk; j++) out[i] += slope(s, r[i]) * seed[j];
+#ifdef FAULT_DERIVATIVE_LINEAR
+        out[i] += 1.0;
+#endif
+    }
+    return OK;
+}
+API int fmi2GetRealOutputDerivatives(State* s, const unsigned r[], size_t n, const int orders[], double out[]) {
+    (void)r;
+    for (size_t i = 0; i < n; i++) {
+        if (orders[i] != 1) return ERROR;
+        get(s, 2, out + i);
+    }
+    return OK;
+}
 API int fmi2SetTime(State* s, double t) { s->t = t; return OK; }
 API int fmi2SetContinuousStates(State* s, const double x[], size_t n) { (void)n; s->x = x[0]; return OK; }
 API int fmi2GetContinuousStates(State* s, double x[], size_t n) { (void)n; x[0] = s->x; return OK; }

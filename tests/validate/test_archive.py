@@ -65,6 +65,8 @@ def link(name, target="/etc/passwd", kind=stat.S_IFLNK):
         ("..\\evil.txt", "backslash"),
         ("resources/./data.txt", "path"),
         ("resources//data.txt", "path"),
+        ("", "path"),
+        ("\0", "control"),
         ("resources/a\nb", "control"),
         ("resources/data.", "trailing"),
         ("resources/data ", "trailing"),

@@ -66,6 +66,32 @@ def test_each_fault_is_found(fault, major, rule, tmp_path):
     assert rule in errors(check(tmp_path, major, fault, description=only(kind, DESCRIPTIONS[major])))
 
 
+DIRECTIONAL = {
+    2: 'canGetAndSetFMUstate="true" providesDirectionalDerivative="true"',
+    3: 'canGetAndSetFMUState="true" providesDirectionalDerivatives="true" providesAdjointDerivatives="true"',
+}
+
+
+@pytest.mark.parametrize(
+    ("fault", "major", "rule"),
+    [
+        ("NONE", 2, None),
+        ("NONE", 3, None),
+        ("DERIVATIVE_LINEAR", 2, "run.derivative"),
+        ("DERIVATIVE_NAN", 3, "run.derivative"),
+        ("DERIVATIVE_REFUSED", 3, "run.refused"),
+        ("ADJOINT", 3, "run.derivative"),
+        ("OUTPUT_DERIVATIVE", 3, "run.nan"),
+    ],
+)
+def test_derivatives_that_are_promised_are_asked_for(fault, major, rule, tmp_path):
+    flag = DIRECTIONAL[major].partition(" ")[0]
+    text = DESCRIPTIONS[major].replace(flag, DIRECTIONAL[major])
+    text = text.replace("canHandleVariable", 'maxOutputDerivativeOrder="1" canHandleVariable')
+    report = check(tmp_path, major, fault, description=text)
+    assert {finding.rule for finding in report.findings} == ({rule} if rule else set())
+
+
 def test_a_hang_on_nan_is_named_and_ends(tmp_path):
     began = time.monotonic()
     text = only("CoSimulation", DESCRIPTIONS[3])

@@ -100,7 +100,43 @@ def bad_steps(fmu: Any, recorder: Recorder) -> None:
         fmu.free()
 
 
-EXPERIMENTS = {"life_cycle": life_cycle, "state": state, "token": token, "bad_steps": bad_steps}
+def derivatives(fmu: Any, recorder: Recorder) -> None:
+    """Directional derivatives are numbers, equal after another call, and the adjoint ones are their transpose."""
+    _instantiate(fmu, recorder)
+    run = _run(fmu, recorder)
+    run.begin()
+    run.advance(1)
+    for unknown, reference, knowns in fmu.plan["jacobian"] if not run.ended else ():
+        row = [fmu.directional([reference], [known], [1.0])[0] for known in knowns]
+        if any(math.isnan(slope) for slope in row):
+            text = f"A directional derivative of {unknown!r} is NaN: {row[:10]}."
+            recorder.find("warning", "run.derivative", text)
+        elif not _close(fmu.directional([reference], knowns, [2.0] * len(knowns))[0], 2.0 * sum(row), row):
+            text = f"The directional derivatives of {unknown!r} do not add up: they must be linear in the seed."
+            recorder.find("error", "run.derivative", text)
+        elif fmu.plan["adjoint"]:
+            column = fmu.directional([reference], knowns, [1.0], adjoint=True)
+            if not all(_close(one, other, row) for one, other in zip(column, row, strict=True)):
+                text = f"The adjoint derivatives of {unknown!r} are {column[:10]}, the directional ones {row[:10]}."
+                recorder.find("error", "run.derivative", text)
+    if fmu.plan["output_derivatives"] and not run.ended:
+        slopes = fmu.output_derivatives(fmu.plan["output_derivatives"])
+        run.require_numbers("An output derivative", slopes)
+    fmu.free()
+
+
+def _close(first: float, second: float, scale: list[float]) -> bool:
+    # Sums in another order differ by rounding only.
+    return math.isclose(first, second, rel_tol=1e-9, abs_tol=1e-9 * max(1.0, *map(abs, scale)))
+
+
+EXPERIMENTS = {
+    "life_cycle": life_cycle,
+    "state": state,
+    "token": token,
+    "bad_steps": bad_steps,
+    "derivatives": derivatives,
+}
 
 
 def _instantiate(fmu: Any, recorder: Recorder) -> None:

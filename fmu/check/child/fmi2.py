@@ -185,6 +185,23 @@ class Fmi2(Library):
         self.do("DeSerializeFMUstate", array, c.c_size_t(len(content)), c.byref(state))
         return state
 
+    def directional(
+        self, unknowns: list[int], knowns: list[int], seed: list[float], *, adjoint: bool = False
+    ) -> list[float]:
+        """Return the product of the Jacobian of scalars and a seed; FMI 2 has no adjoint one."""
+        rows, columns = (c.c_uint * len(unknowns))(*unknowns), (c.c_uint * len(knowns))(*knowns)
+        given, found = (c.c_double * len(seed))(*seed), (c.c_double * len(unknowns))()
+        sizes = c.c_size_t(len(unknowns)), c.c_size_t(len(knowns))
+        self.do("GetDirectionalDerivative", rows, sizes[0], columns, sizes[1], given, found)
+        return list(found)
+
+    def output_derivatives(self, references: list[int]) -> list[float]:
+        """Return the first time derivatives of outputs."""
+        array, found = (c.c_uint * len(references))(*references), (c.c_double * len(references))()
+        orders = (c.c_int * len(references))(*[1] * len(references))
+        self.do("GetRealOutputDerivatives", array, c.c_size_t(len(references)), orders, found)
+        return list(found)
+
 
 _VECTORS = {
     "derivatives": "GetDerivatives",

@@ -193,6 +193,25 @@ class Fmi3(Library):
         self.do("DeserializeFMUState", array, c.c_size_t(len(content)), c.byref(state))
         return state
 
+    def directional(
+        self, unknowns: list[int], knowns: list[int], seed: list[float], *, adjoint: bool = False
+    ) -> list[float]:
+        """Return the product of the Jacobian of scalars, or of its transpose, and a seed."""
+        rows, columns = (c.c_uint32 * len(unknowns))(*unknowns), (c.c_uint32 * len(knowns))(*knowns)
+        given = (c.c_double * len(seed))(*seed)
+        found = (c.c_double * (len(knowns) if adjoint else len(unknowns)))()
+        sizes = c.c_size_t(len(unknowns)), c.c_size_t(len(knowns)), c.c_size_t(len(given)), c.c_size_t(len(found))
+        name = "GetAdjointDerivative" if adjoint else "GetDirectionalDerivative"
+        self.do(name, rows, sizes[0], columns, sizes[1], given, sizes[2], found, sizes[3])
+        return list(found)
+
+    def output_derivatives(self, references: list[int]) -> list[float]:
+        """Return the first time derivatives of outputs."""
+        size = c.c_size_t(len(references))
+        array, found = (c.c_uint32 * len(references))(*references), (c.c_double * len(references))()
+        self.do("GetOutputDerivatives", array, size, (c.c_int32 * len(references))(*[1] * len(references)), found, size)
+        return list(found)
+
     def activate(self, clock: Variable, t: float) -> None:
         """Activate the model partition of a clock."""
         self.do("ActivateModelPartition", c.c_uint32(clock.reference), c.c_double(t), shown=clock.name)

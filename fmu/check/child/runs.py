@@ -9,6 +9,8 @@ from fmu.check.child.calls import DISCARD, OK, WARNING, Recorder, Variable
 
 ITERATIONS = 100
 """Event iterations at one instant."""
+OUTPUTS = 500
+"""Outputs that are read at each communication point; all variables are read at the first one."""
 RETURNS = 10_000
 """Returns of steps, over a whole run, before the next communication point."""
 
@@ -24,7 +26,7 @@ class Run:
         self.next_time: float | None = None
         self.ended = False
         self.readable = [v for v in fmu.variables if v.readable]
-        self.outputs = [v for v in self.readable if v.causality == "output"]
+        self.outputs = [v for v in self.readable if v.causality == "output"][:OUTPUTS]
         self._nan: set[str] = set()
 
     def initialize(self) -> None:
