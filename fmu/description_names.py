@@ -81,7 +81,8 @@ def structured_name(name: str) -> str | None:
 
 def _split(name: str) -> list[str]:
     """Split at the dots that are outside apostrophes."""
-    parts, rest = [], name
+    parts: list[str] = []
+    rest = name
     while True:
         quoted = _QUOTED.match(rest)
         dot = rest.find(".", quoted.end() if quoted else 0)

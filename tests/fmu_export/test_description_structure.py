@@ -1,0 +1,190 @@
+"""ModelStructure: dependencies and their kinds, against hand-made analysis and against numbers."""
+
+import itertools
+
+import casadi as ca
+import numpy as np
+import pytest
+from description_cases import BOTH, described
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hybrid_model as hm
+from fmu.description_factors import Factor, factors
+from fmu.variables import Bank, Fmi
+from hybrid_model.models import BouncingBall
+
+
+def by_name(description, unknowns):
+    names = description.names
+    return {names[u.variable]: dict(zip((names[k] for k in u.dependencies), u.kinds, strict=True)) for u in unknowns}
+
+
+class Kinds(hm.HybridAutomaton):
+    """One dependency of each kind."""
+
+    x = hm.State(1.0)
+    y = hm.State(computed=True, output=True)
+    mode = hm.DiscreteState(1.0, output=True)
+    p = hm.Parameter(2.0)
+    u = hm.Input(0.5)
+    v = hm.Input(0.5, discrete=True)
+    constant = hm.Output()
+    fixed = hm.Output()
+    switched = hm.Output()
+    free = hm.Output()
+    stepped = hm.Output()
+    clocklike = hm.Output()
+
+    def flow_map(self, s):
+        return {"x": s.p * s.u - 3.0 * s.x, "y": s.mode * s.v}
+
+    def start_map(self, s):
+        return {"y": 2.0 * s.x + s.p}
+
+    def outputs(self, s):
+        return {
+            "constant": 2.0 * s.u + s.p + s.mode,
+            "fixed": s.p**2 * s.u + s.x**2,
+            "switched": np.where(s.mode > 0.5, 2.0, 3.0) * s.u,
+            "free": s.u * s.v,
+            "stepped": s.u + np.where(s.u > 0.0, 1.0, 0.0) + 4.0 * s.x,
+            "clocklike": s.y + np.sin(s.t),
+        }
+
+
+@pytest.mark.parametrize("fmi", BOTH)
+def test_kinds_of_dependencies_while_running(fmi):
+    description = described(Kinds(), fmi)
+    found = by_name(description, description.structure.outputs)
+    assert found == {
+        "constant": {"u": "constant"},
+        "fixed": {"u": "fixed", "x": "dependent"},
+        "switched": {"u": "discrete"},
+        "free": {"u": "dependent", "v": "dependent"},
+        "stepped": {"u": "dependent", "x": "constant"},
+        "clocklike": {"time": "dependent", "y": "constant"},
+        "y": {"y": "constant"},
+        "mode": {},
+    }
+    assert by_name(description, description.structure.derivatives) == {
+        "der(x)": {"u": "fixed", "x": "constant"},
+        "der(y)": {"v": "discrete"},
+    }
+
+
+@pytest.mark.parametrize("fmi", BOTH)
+def test_dependencies_at_the_start_go_through_computed_states(fmi):
+    description = described(Kinds(), fmi)
+    found = by_name(description, description.structure.initial)
+    assert found == {
+        "constant": {"p": "constant", "u": "constant", "mode": "constant"},
+        "fixed": {"p": "dependent", "u": "dependent", "x": "dependent"},
+        "switched": {"mode": "dependent", "u": "dependent"},
+        "free": {"u": "dependent", "v": "dependent"},
+        "stepped": {"u": "dependent", "x": "constant"},
+        # y starts at 2 x + p.
+        "clocklike": {"time": "dependent", "x": "constant", "p": "constant"},
+        "y": {"x": "constant", "p": "constant"},
+        "der(x)": {"u": "dependent", "p": "dependent", "x": "constant"},
+        "der(y)": {"mode": "dependent", "v": "dependent"},
+    }
+
+
+def test_indicators_and_clocks_depend_on_what_their_margins_do():
+    description = described(BouncingBall(), Fmi.V3_0)
+    assert by_name(description, description.structure.indicators) == {
+        "margin.jump": {"h": "dependent", "v": "dependent"},
+        "margin.flow_set": {"h": "constant"},
+    }
+    outputs = by_name(description, description.structure.outputs)
+    # The countdown clock, where there is one, contributes to every tick.
+    assert {"h", "v"} <= set(outputs["impact"]) <= {"h", "v", "next_event"}
+
+
+def test_derivatives_are_in_the_order_of_the_state_vector():
+    description = described(Kinds(), Fmi.V3_0)
+    variables = description.variables
+    indices = [variables[u.variable].index for u in description.structure.derivatives]
+    assert indices == sorted(indices)
+    assert all(variables[u.variable].bank is Bank.DERIVATIVE for u in description.structure.derivatives)
+
+
+def test_an_array_depends_as_its_freest_element():
+    """In FMI 3.0 an array is one variable: u enters one element by a constant factor and the other squared."""
+
+    class Block(hm.HybridAutomaton):
+        n = hm.Dimension()
+        x = hm.State(0.0, shape="n")
+        u = hm.Input(1.0)
+        w = hm.Input(1.0)
+
+        def flow_map(self, s):
+            return {"x": np.stack([s.u + s.w, s.u**2])}
+
+    description = described(Block(n=2), Fmi.V3_0)
+    assert by_name(description, description.structure.derivatives) == {"der(x)": {"u": "dependent", "w": "constant"}}
+    scalar = described(Block(n=2), Fmi.V2_0)
+    assert by_name(scalar, scalar.structure.derivatives) == {
+        "der(x[1])": {"u": "constant", "w": "constant"},
+        "der(x[2])": {"u": "dependent"},
+    }
+
+
+ARGUMENTS = [ca.SX.sym(name, size) for name, size in (("t", 1), ("x", 2), ("z", 1), ("u", 2), ("p", 1))]
+SCALARS = [ARGUMENTS[k][i] for k in range(5) for i in range(ARGUMENTS[k].numel())]
+LEAVES = st.one_of(st.integers(0, len(SCALARS) - 1).map(lambda k: SCALARS[k]), st.sampled_from([2.0, -1.0, 0.5]))
+
+
+def grown(children):
+    pairs = st.tuples(children, children)
+    return st.one_of(
+        pairs.map(lambda ab: ab[0] + ab[1]),
+        pairs.map(lambda ab: ab[0] - ab[1]),
+        pairs.map(lambda ab: ab[0] * ab[1]),
+        pairs.map(lambda ab: ca.fmin(ab[0], ab[1])),
+        st.tuples(children, children, children).map(lambda abc: ca.if_else(abc[0] > 0.25, abc[1], abc[2])),
+        children.map(ca.sin),
+        children.map(ca.floor),
+        children.map(ca.sign),
+    )
+
+
+@given(st.lists(st.recursive(LEAVES, grown, max_leaves=6), min_size=1, max_size=3), st.integers(0, 2**31))
+@settings(deadline=None, max_examples=150)
+def test_kinds_hold_for_numbers(expressions, seed):
+    """A factor that is called constant is one number at all points, a fixed one at all points with the same p, ..."""
+    function = ca.Function("drawn", ARGUMENTS, [ca.vertcat(*expressions)])
+    found = np.zeros((len(expressions), len(SCALARS)), dtype=int)
+    ends = np.cumsum([0, *(argument.numel() for argument in ARGUMENTS)])
+    for matrix, first, last in zip(factors(function), ends[:-1], ends[1:], strict=True):
+        found[:, first:last] = matrix.toarray()
+    random = np.random.default_rng(seed)
+    may_change = {
+        0: range(7),
+        Factor.CONSTANT + 1: range(7),
+        Factor.FIXED + 1: range(6),
+        Factor.DISCRETE + 1: (0, 1, 2, 4, 5),
+    }
+    base = random.normal(size=len(SCALARS))
+    for row, column in itertools.product(*map(range, found.shape)):
+        if found[row, column] == Factor.DEPENDENT + 1:
+            continue
+        slopes = []
+        for _ in range(4):
+            point = base.copy()
+            free = list(may_change[int(found[row, column])])
+            point[free] = random.normal(size=len(free))
+            moved = point.copy()
+            moved[column] += random.normal()
+            change = (_value(function, moved) - _value(function, point))[row]
+            slopes.append(change / (moved[column] - point[column]) if found[row, column] else change)
+        # Values are of order one, differences cancel at most some digits.
+        assert np.ptp(slopes) < 1e-6 * (1.0 + np.abs(slopes).max()) or found[row, column] == 0 == np.ptp(slopes)
+        if found[row, column] == 0:
+            assert np.all(np.array(slopes) == 0.0)
+
+
+def _value(function, point):
+    parts = np.split(point, np.cumsum([argument.numel() for argument in ARGUMENTS])[:-1])
+    return np.asarray(function(*parts)).ravel()
