@@ -9,6 +9,7 @@ from pathlib import Path
 from lxml import etree
 
 from fmu.check.archive import DESCRIPTION, LIMITS, Archive, ArchiveError, ArchiveLimits
+from fmu.check.child_process import RunLimits
 from fmu.check.description import Description, read_description
 from fmu.check.findings import Finding, Report, error, note, quoted
 from fmu.check.fmpy_findings import fmpy_findings
@@ -17,7 +18,7 @@ from fmu.check.rules_files import file_findings
 from fmu.check.rules_interfaces import interface_findings
 from fmu.check.rules_structure import structure_findings
 from fmu.check.rules_variables import variable_findings
-from fmu.check.smoke import RunLimits, run_fmu
+from fmu.check.smoke import run_fmu
 from fmu.check.xml_file import XmlError, parse, require_size, schema_findings
 
 SAFETY = "FMI 3.0.2 section 2.5: ZIP with store or deflate, no encryption, '/' between folders"

@@ -39,6 +39,9 @@ static State* make(const char* token) {
 #ifdef FAULT_FILE
     fclose(fopen("solver.log", "w"));
 #endif
+#ifdef FAULT_FLOOD
+    for (;;) printf("a line of a very talkative solver\n");
+#endif
 #ifdef FAULT_FORK
     if (fork() == 0) execlp("sleep", "sleep", "3141592", (char*)NULL);
     for (;;) pause();
@@ -164,7 +167,13 @@ API void fmi3FreeInstance(State* s) { free(s); }
 API int fmi3EnterInitializationMode(State* s, bool d, double tol, double start) { (void)d; (void)tol; s->t = start; return OK; }
 API int fmi3ExitInitializationMode(State* s) { (void)s; return OK; }
 API int fmi3EnterEventMode(State* s) { (void)s; return OK; }
-API int fmi3EnterStepMode(State* s) { (void)s; return OK; }
+API int fmi3EnterStepMode(State* s) {
+#ifdef FAULT_NEEDS_EVENT_MODE
+    s->memory = -1.0;
+#endif
+    (void)s;
+    return OK;
+}
 API int fmi3Terminate(State* s) { (void)s; return OK; }
 API int fmi3Reset(State* s) { reset(s); return OK; }
 API int fmi3GetFloat64(State* s, const uint32_t r[], size_t n, double v[], size_t nv) {
@@ -199,6 +208,9 @@ API int fmi3DoStep(State* s, double t, double h, bool no, bool* event, bool* end
     (void)no;
     *event = *end = *early = false;
     int status = step(s, t, h);
+#ifdef FAULT_NEEDS_EVENT_MODE
+    if (s->memory >= 0.0) return ERROR;
+#endif
     *last = s->t;
 #ifdef FAULT_LAST_TIME
     *last = t + h / 2.0;

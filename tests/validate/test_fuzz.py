@@ -11,7 +11,7 @@ from fmu.check.findings import Report, Severity
 from fmu.check.fmu_file import check_fmu
 
 FUZZ = settings(
-    max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
 )
 TEXTS = (DESCRIPTIONS[2], DESCRIPTIONS[3], SCHEDULED)
 WORDS = sorted({word for text in TEXTS for word in text.replace("/", " ").replace("<", " ").replace(">", " ").split()})

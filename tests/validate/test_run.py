@@ -8,9 +8,9 @@ import time
 import pytest
 from small_fmus import DESCRIPTIONS, SCHEDULED, members, only, write
 
+from fmu.check.child_process import RunLimits
 from fmu.check.findings import Severity
 from fmu.check.fmu_file import check_fmu
-from fmu.check.smoke import RunLimits
 
 LIMITS = RunLimits(seconds=2.0, memory=512 << 20)
 
@@ -55,6 +55,7 @@ FAULTS = [
     ("LAST_TIME", (3,), "run.time"),
     ("PROGRESS", (3,), "run.progress"),
     ("COUNTS", (3,), "run.counts"),
+    ("NEEDS_EVENT_MODE", (3,), "run.step"),
 ]
 
 
@@ -99,6 +100,14 @@ def test_a_hang_on_nan_is_named_and_ends(tmp_path):
     [finding] = [finding for finding in report.findings if finding.rule == "run.hang"]
     assert "fmi3DoStep(0.0, nan)" in finding.message
     assert time.monotonic() - began < 60.0  # it would take for ever
+
+
+def test_a_flood_of_output_is_limited(tmp_path):
+    """The limit of file size holds on stdout: the disk is not filled while the time runs out."""
+    text = only("CoSimulation", DESCRIPTIONS[3])
+    report = check(tmp_path, 3, "FLOOD", description=text, limits=RunLimits(seconds=1.0, file_bytes=1 << 20))
+    assert errors(report) == {"run.hang"}
+    assert any("talkative" in finding.message for finding in report.findings)
 
 
 def test_memory_is_limited(tmp_path):
