@@ -63,8 +63,9 @@ def check_network(seed, most_agents, runs, seen, **kinds):
     check_rates(random, analysis)
     share = float(random.uniform(0, 0.8))  # of beta in the rate
     # What the runs have in common is computed once, and then known to all that are alike.
-    rate = Bounds(analysis).floquet_rate or 0.3
-    analysis.worst(0.0), analysis.worst(share * rate), Bounds(analysis).energy_radius, Bounds(analysis).improved_gap
+    common = Bounds(analysis)
+    rate = common.floquet_rate or 0.3
+    analysis.worst(0.0), analysis.worst(share * rate), common.energy_radius, common.improved_gap, common.printed
     for number in range(runs):
         check_run(random, analysis, KINDS[number % len(KINDS)], share, seen)
 
