@@ -1,7 +1,7 @@
 """Exact runs under every kind of weight, with states at chosen times: the solver of `exact_consensus` on other pieces.
 
 Between its breakpoints each weight is ``level + slope (t - start) + swing sin(rate t - phase)``; the solver asks for
-its value, its integral and a bound on its slope. Levels come from the carriers of the package, integrals are written out.
+its value, its integral and a bound on its slope. Levels come from the package, integrals are written out here.
 Sampled checks have a loop of their own: at each check the errors are compared with the threshold of that time.
 """
 
