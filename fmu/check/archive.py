@@ -1,20 +1,19 @@
 """The archive of an FMU: looked at before anything is written, then extracted.
 
-This module needs only the standard library and nothing of the exporter, so that importers may use it too.
+This module and `fmu.check.archive_rules` need only the standard library and nothing of the exporter, so that importers
+may use them too.
 """
 
 from __future__ import annotations
 
-import itertools
-import stat
 import struct
-import unicodedata
 import zipfile
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
+
+from fmu.check.archive_rules import LIMITS, ArchiveLimits, is_folder, problems_of
 
 BROKEN = (
     zipfile.BadZipFile,
@@ -30,11 +29,7 @@ BROKEN = (
 )
 """What `zipfile` raises on damaged archives."""
 
-ENCRYPTED, STORED, DEFLATED = 0x1, 0, 8
-DESCRIPTION = "modelDescription.xml"
 _CHUNK = 1 << 20
-_LOCAL_HEADER = 30
-_RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 
 
 class ArchiveError(ValueError):
@@ -49,34 +44,6 @@ class ArchiveError(ValueError):
     def __init__(self, problems: tuple[tuple[str, str], ...]) -> None:
         super().__init__(" ".join(sentence for _, sentence in problems[:5]))
         self.problems = problems
-
-
-@dataclass(frozen=True)
-class ArchiveLimits:
-    """What an archive may hold.
-
-    Attributes
-    ----------
-    entries : int
-        Members.
-    total_bytes : int
-        All members unpacked, in bytes.
-    ratio : float
-        Unpacked to packed size of one member; asked of members larger than `ratio_from` bytes, for text of zeros and
-        blanks packs well.
-    ratio_from : int
-    name_length : int
-        Characters of a member's name.
-    """
-
-    entries: int = 20_000
-    total_bytes: int = 2 << 30
-    ratio: float = 200.0
-    ratio_from: int = 16 << 20
-    name_length: int = 1024
-
-
-LIMITS = ArchiveLimits()
 
 
 class Archive:
@@ -107,7 +74,7 @@ class Archive:
             self._file.close()
             raise
         self.prefixed = bool(self._zip.infolist()) and min(m.header_offset for m in self._zip.infolist()) > 0
-        self._members = {member.filename: member for member in self._zip.infolist() if not _is_folder(member)}
+        self._members = {member.filename: member for member in self._zip.infolist() if not is_folder(member)}
 
     def __enter__(self) -> Archive:
         return self
@@ -197,119 +164,3 @@ def _opened(file: IO[bytes]) -> zipfile.ZipFile:
         raise ArchiveError(
             (("zip", f"The file is not a readable ZIP archive: {error}. Pack the FMU anew."),)
         ) from error
-
-
-def problems_of(archive: zipfile.ZipFile, limits: ArchiveLimits) -> Iterator[tuple[str, str]]:
-    """Yield the rule and the sentence of each reason not to extract an archive."""
-    members = archive.infolist()
-    if len(members) > limits.entries:
-        yield "entries", f"The archive has {len(members)} members; at most {limits.entries} are accepted."
-        return
-    for member in members:
-        yield from _name_problems(member, limits)
-        yield from _member_problems(member, limits)
-    total = sum(member.file_size for member in members)
-    if total > limits.total_bytes:
-        yield "size", f"The archive unpacks to {total} bytes; at most {limits.total_bytes} are accepted."
-    yield from _clashes(members)
-    yield from _overlaps(members)
-    if DESCRIPTION not in archive.NameToInfo:
-        yield (
-            "description",
-            f"The archive has no {DESCRIPTION} at its top; every FMU has one: pack the folder's content.",
-        )
-
-
-def _name_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[tuple[str, str]]:
-    name = member.orig_filename  # `filename` is cut at a NUL and has the separators of this system
-    shown = repr(name[:120])
-    parts = name.removesuffix("/").split("/")
-    if "\\" in name:
-        yield "backslash", f"The member {shown} has a backslash; ZIP separates folders by '/'."
-    if name.startswith("/"):
-        yield "absolute", f"The member {shown} is an absolute path; an FMU stays within its folder."
-    elif "" in parts or "." in parts:
-        yield "path", f"The member {shown} has an empty or '.' part; give a plain relative path."
-    if ".." in parts:
-        yield "traversal", f"The member {shown} leaves the FMU's folder by '..'; give a plain relative path."
-    if ":" in name:
-        yield "drive", f"The member {shown} has a colon, which names a drive or stream on Windows; rename it."
-    if any(unicodedata.category(c) in ("Cc", "Cs") for c in name):
-        yield "control", f"The member {shown} has a control character in its name; rename it."
-    if len(name) > limits.name_length or any(len(part.encode("utf-8", "replace")) > 255 for part in parts):
-        yield "long", f"The member {shown} has a name of {len(name)} characters, which file systems refuse; shorten it."
-    if any(part.rstrip(". ") != part for part in parts if part not in ("", ".", "..")):
-        yield "trailing", f"The member {shown} ends in a dot or blank, which Windows drops; rename it."
-    if any(part.partition(".")[0].lower() in _RESERVED for part in parts):
-        yield "reserved", f"The member {shown} has the name of a Windows device; rename it."
-
-
-def _member_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[tuple[str, str]]:
-    shown = repr(member.orig_filename[:120])
-    kind = stat.S_IFMT(member.external_attr >> 16)
-    if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
-        what = "a symbolic link" if kind == stat.S_IFLNK else "a special file"
-        yield "link", f"The member {shown} is {what}; an FMU holds plain files: put the file itself there."
-    if member.flag_bits & ENCRYPTED:
-        yield "encrypted", f"The member {shown} is encrypted, which FMI forbids; pack it in plain."
-    if member.compress_type not in (STORED, DEFLATED):
-        yield (
-            "compression",
-            f"The member {shown} has compression method {member.compress_type}; FMI allows 0 (store) and 8 (deflate).",
-        )
-    if _is_folder(member) and member.file_size:
-        yield "folder", f"The folder {shown} holds {member.file_size} bytes; a folder holds none."
-    if member.file_size > limits.ratio_from and member.file_size > limits.ratio * max(member.compress_size, 1):
-        ratio = member.file_size / max(member.compress_size, 1)
-        yield (
-            "ratio",
-            f"The member {shown} unpacks {ratio:.0f}-fold to {member.file_size} bytes; "
-            f"at most {limits.ratio:g}-fold is accepted: it looks like a decompression bomb.",
-        )
-
-
-def _is_folder(member: zipfile.ZipInfo) -> bool:
-    return member.filename.endswith("/")  # `ZipInfo.is_dir` fails on an empty name
-
-
-def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[tuple[str, str]]:
-    exact: set[str] = set()
-    folded: dict[str, str] = {}
-    files: set[str] = set()
-    folders: set[str] = set()
-    for member in members:
-        name = member.filename.removesuffix("/")
-        key = unicodedata.normalize("NFC", name).casefold()
-        if name in exact:
-            yield "duplicate", f"The member {name[:120]!r} is there twice, and readers differ in which one they take."
-        elif key in folded:
-            yield (
-                "case",
-                f"The members {folded[key][:120]!r} and {name[:120]!r} are one file on systems that ignore "
-                "case: rename one.",
-            )
-        exact.add(name)
-        folded.setdefault(key, name)
-        parts = key.split("/")
-        if len(parts) <= 64:
-            folders.update("/".join(parts[:depth]) for depth in range(1, len(parts)))
-        else:
-            yield "deep", f"The member {name[:120]!r} lies {len(parts)} folders deep; at most 64 are accepted."
-        if not _is_folder(member):
-            files.add(key)
-    for key in sorted(files & folders):
-        yield "duplicate", f"The member {key[:120]!r} is a file and a folder at once."
-
-
-def _overlaps(members: list[zipfile.ZipInfo]) -> Iterator[tuple[str, str]]:
-    # Members that share bytes unpack to more than the limits on each one foresee.
-    ordered = sorted(members, key=lambda member: member.header_offset)
-    for first, second in itertools.pairwise(ordered):
-        if first.header_offset + _LOCAL_HEADER + first.compress_size > second.header_offset:
-            yield (
-                "overlap",
-                f"The members {first.orig_filename[:120]!r} and {second.orig_filename[:120]!r} share bytes of "
-                "the archive: "
-                "it looks like a decompression bomb.",
-            )
-            return

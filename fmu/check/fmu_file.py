@@ -8,7 +8,8 @@ from pathlib import Path
 
 from lxml import etree
 
-from fmu.check.archive import DESCRIPTION, LIMITS, Archive, ArchiveError, ArchiveLimits
+from fmu.check.archive import Archive, ArchiveError
+from fmu.check.archive_rules import DESCRIPTION, LIMITS, ArchiveLimits
 from fmu.check.child_process import RunLimits
 from fmu.check.description import Description, read_description
 from fmu.check.findings import Finding, Report, error, note, quoted

@@ -10,7 +10,8 @@ import zlib
 import pytest
 from small_fmus import DESCRIPTIONS
 
-from fmu.check.archive import Archive, ArchiveError, ArchiveLimits, extract_fmu
+from fmu.check.archive import Archive, ArchiveError, extract_fmu
+from fmu.check.archive_rules import ArchiveLimits
 from fmu.check.fmu_file import check_fmu
 
 DESCRIPTION = ("modelDescription.xml", DESCRIPTIONS[3].encode())

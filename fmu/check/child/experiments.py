@@ -9,11 +9,20 @@ from pathlib import Path
 from typing import Any
 
 from fmu.check.child.calls import OK, WARNING, Recorder, Stopped
+from fmu.check.child.co_simulation import CoSimulation
 from fmu.check.child.fmi2 import Fmi2
 from fmu.check.child.fmi3 import Fmi3
-from fmu.check.child.runs import RUNS, Bits, Run
+from fmu.check.child.model_exchange import ModelExchange
+from fmu.check.child.run import Bits, Run
+from fmu.check.child.scheduled_execution import ScheduledExecution
 
 POINTS = 200
+"""Communication points of a run at most."""
+RUNS: dict[str, type[Run]] = {
+    "CoSimulation": CoSimulation,
+    "ModelExchange": ModelExchange,
+    "ScheduledExecution": ScheduledExecution,
+}
 
 
 def life_cycle(fmu: Any, recorder: Recorder) -> None:
