@@ -59,7 +59,7 @@ def factors(function: ca.Function, result: int = 0) -> list[Matrix]:
     for number, argument in enumerate(arguments):
         pattern = function.jac_sparsity(result, number)
         rows, columns = (np.array(index, dtype=np.int64) for index in pattern.get_triplet())
-        kinds = _kinds(arguments, expression, argument, rows, columns)
+        kinds = _kinds(arguments, expression, number, rows, columns)
         if stepped:
             through = [
                 bool(stepped[row] >> int(ends[number] + column) & 1) for row, column in zip(rows, columns, strict=True)
@@ -73,7 +73,7 @@ def factors(function: ca.Function, result: int = 0) -> list[Matrix]:
 def _kinds(
     arguments: Sequence[ca.SX],
     expression: ca.SX,
-    argument: ca.SX,
+    number: int,
     rows: npt.NDArray[np.int64],
     columns: npt.NDArray[np.int64],
 ) -> npt.NDArray[np.int64]:
@@ -81,11 +81,13 @@ def _kinds(
     kinds = np.full(rows.size, Factor.DEPENDENT, dtype=np.int64)
     if rows.size == 0:
         return kinds
+    argument = arguments[number]
     slopes = ca.jacobian(expression, argument)
     known_rows, known_columns = (np.array(index, dtype=np.int64) for index in slopes.sparsity().get_triplet())
     entries = slopes.nz[:] if slopes.nnz() else ca.SX(0, 1)
     depends = [_rows_that_depend(entries, item) for item in arguments]
-    free = depends[_T] | depends[_X] | depends[_U]
+    # A factor that moves with what it is a factor of is none: z in z * z.
+    free = depends[_T] | depends[_X] | depends[_U] | depends[number]
     by_entry = np.select([free, depends[_Z], depends[_P]], [Factor.DEPENDENT, Factor.DISCRETE, Factor.FIXED], 0)
     width = argument.numel()
     order = np.argsort(known_rows * width + known_columns)

@@ -40,11 +40,12 @@ def findings(document, folder, clocks=()):
     try:
         read_model_description(str(folder), validate=True, validate_variable_names=True, validate_model_structure=True)
     except ValidationError as error:
-        return [problem for problem in error.problems if not _only_clocks(problem, clocks)]
+        return [problem for problem in error.problems if not only_clocks(problem, clocks)]
     return []
 
 
-def _only_clocks(problem, clocks):
+def only_clocks(problem, clocks):
+    """Whether a finding of fmpy is the false one."""
     match = FALSE_FINDING.search(problem)
     if match is None:
         return False

@@ -20,7 +20,7 @@ def folder(tmp_path_factory):
 
 
 @given(drawn_automata())
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_drawn_automata(folder, automaton):
     for fmi in BOTH:
         try:
