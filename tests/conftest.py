@@ -8,7 +8,7 @@ from fmu.export import export_fmu
 
 @pytest.fixture(scope="session")
 def exported(tmp_path_factory):
-    """Export an automaton once a session, whatever the number of test processes; equal keys share the file."""
+    """Export an automaton once a session and version, whatever the number of test processes; equal keys share it."""
     folder = tmp_path_factory.getbasetemp()
     if "PYTEST_XDIST_WORKER" in os.environ:
         folder = folder.parent
@@ -16,8 +16,8 @@ def exported(tmp_path_factory):
     folder.mkdir(exist_ok=True)
     own = tmp_path_factory.mktemp("exports")
 
-    def export(automaton, key=None):
-        key = key or automaton.name
+    def export(automaton, key=None, fmi="3.0"):
+        key = (key or automaton.name) + ("" if fmi == "3.0" else f"-fmi{fmi}")
         path, claim = folder / f"{key}.fmu", folder / f"{key}.claim"
         while not path.exists():
             try:
@@ -27,7 +27,7 @@ def exported(tmp_path_factory):
                 time.sleep(0.05)
                 continue
             try:
-                os.replace(export_fmu(automaton, own / f"{key}.fmu"), path)
+                os.replace(export_fmu(automaton, own / f"{key}.fmu", fmi=fmi), path)
             finally:
                 claim.rmdir()
         return path

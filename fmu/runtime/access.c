@@ -13,7 +13,7 @@ static bool may_be_set(const ModelVariable *variable, int mode)
 {
     bool before_start = (mode & (MODE_INSTANTIATED | MODE_INITIALIZATION)) != 0;
     switch (variable->bank) {
-    case BANK_INPUT: return mode != MODE_INTERMEDIATE || !variable->discrete;
+    case BANK_INPUT: return mode != MODE_CONFIGURATION && (mode != MODE_INTERMEDIATE || !variable->discrete);
     case BANK_PARAMETER:
     case BANK_OPTION: return before_start;
     case BANK_STATE:

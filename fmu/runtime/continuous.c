@@ -4,19 +4,9 @@
 
 #include "instance.h"
 
-static Instance *enter_exchange(void *handle, const char *function, int modes)
-{
-    Instance *instance = enter(handle, function, modes);
-    if (!instance || instance->interface == MODEL_EXCHANGE)
-        return instance;
-    refuse(instance, "%s: %s is for Model Exchange, but this is an instance for Co-Simulation.", instance->name,
-           function);
-    return NULL;
-}
-
 Answer instance_set_time(void *handle, const char *function, double time)
 {
-    Instance *instance = enter_exchange(handle, function, MODE_EVENT | MODE_CONTINUOUS);
+    Instance *instance = enter_kind(handle, function, MODEL_EXCHANGE, MODE_EVENT | MODE_CONTINUOUS);
     if (!instance)
         return ANSWER_ERROR;
     if (!isfinite(time))
@@ -37,7 +27,7 @@ static Answer check_length(const Instance *instance, const char *function, const
 
 Answer instance_set_states(void *handle, const char *function, const double x[], size_t n)
 {
-    Instance *instance = enter_exchange(handle, function, MODE_CONTINUOUS);
+    Instance *instance = enter_kind(handle, function, MODEL_EXCHANGE, MODE_CONTINUOUS);
     if (!instance || check_length(instance, function, x, n, model.n_states) != ANSWER_OK)
         return ANSWER_ERROR;
     for (size_t i = 0; i < n; i++)
@@ -57,7 +47,7 @@ static const char *name_of(Bank bank, size_t i)
 
 Answer instance_get_vector(void *handle, const char *function, Bank bank, double values[], size_t n)
 {
-    Instance *instance = enter_exchange(handle, function, MODE_RUNNING);
+    Instance *instance = enter_kind(handle, function, MODEL_EXCHANGE, MODE_RUNNING);
     if (!instance)
         return ANSWER_ERROR;
     Engine *engine = instance->engine;
@@ -82,7 +72,7 @@ Answer instance_get_vector(void *handle, const char *function, Bank bank, double
 
 Answer instance_nominals(void *handle, const char *function, double values[], size_t n)
 {
-    Instance *instance = enter_exchange(handle, function, MODE_ANY);
+    Instance *instance = enter_kind(handle, function, MODEL_EXCHANGE, MODE_ANY);
     if (!instance || check_length(instance, function, values, n, model.n_states) != ANSWER_OK)
         return ANSWER_ERROR;
     for (size_t i = 0; i < n; i++)
@@ -92,7 +82,7 @@ Answer instance_nominals(void *handle, const char *function, double values[], si
 
 Answer instance_completed_step(void *handle, const char *function, bool *event, bool *terminate)
 {
-    Instance *instance = enter_exchange(handle, function, MODE_CONTINUOUS);
+    Instance *instance = enter_kind(handle, function, MODEL_EXCHANGE, MODE_CONTINUOUS);
     if (!instance)
         return ANSWER_ERROR;
     if (!event || !terminate)

@@ -247,9 +247,10 @@ fmi2Status fmi2CancelStep(fmi2Component c)
 
 static fmi2Status no_such_status(fmi2Component c, const char *function, fmi2StatusKind s)
 {
-    const Instance *instance = enter(c, function, MODE_ANY);
-    if (instance)
-        refuse(instance, "%s: %s: there is no status of kind %d of that type.", instance->name, function, (int)s);
+    const Instance *instance = enter_kind(c, function, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
+    if (!instance)
+        return fmi2Error;
+    refuse(instance, "%s: %s: there is no status of kind %d of that type.", instance->name, function, (int)s);
     return fmi2Discard;
 }
 
@@ -261,7 +262,7 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *va
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
 {
-    const Instance *instance = enter(c, __func__, MODE_STEP | MODE_TERMINATED);
+    const Instance *instance = enter_kind(c, __func__, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
     if (!instance || !value)
         return status_of(instance ? null_argument(instance, __func__) : ANSWER_ERROR);
     if (s != fmi2LastSuccessfulTime)
@@ -278,7 +279,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
 {
-    const Instance *instance = enter(c, __func__, MODE_STEP | MODE_TERMINATED);
+    const Instance *instance = enter_kind(c, __func__, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
     if (!instance || !value)
         return status_of(instance ? null_argument(instance, __func__) : ANSWER_ERROR);
     if (s != fmi2Terminated)

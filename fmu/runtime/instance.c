@@ -50,6 +50,17 @@ Instance *enter(void *handle, const char *function, int modes)
     return NULL;
 }
 
+Instance *enter_kind(void *handle, const char *function, Interface kind, int modes)
+{
+    static const char *const KINDS[] = {"Co-Simulation", "Model Exchange"};
+    Instance *instance = enter(handle, function, modes);
+    if (!instance || instance->interface == kind)
+        return instance;
+    refuse(instance, "%s: %s is for %s, but this is an instance for %s.", instance->name, function, KINDS[kind],
+           KINDS[instance->interface]);
+    return NULL;
+}
+
 Answer null_argument(const Instance *instance, const char *function)
 {
     return refuse(instance, "%s: %s was called with a null pointer; every argument needs a place to point to.",

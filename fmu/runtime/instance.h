@@ -69,6 +69,8 @@ Answer refuse(const Instance *instance, const char *format, ...) LIKE_PRINTF(2, 
 Answer null_argument(const Instance *instance, const char *function);
 /* The instance, if the function may be called now; NULL (and one log line) otherwise. */
 Instance *enter(void *handle, const char *function, int modes);
+/* The same for a function of one kind of instances only. */
+Instance *enter_kind(void *handle, const char *function, Interface kind, int modes);
 const char *mode_name(int mode);
 void instance_free(void *handle, const char *function);
 Answer instance_reset(void *handle, const char *function);

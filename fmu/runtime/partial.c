@@ -104,7 +104,8 @@ Answer instance_derivatives(void *handle, const char *function, const Direction 
 Answer instance_output_rates(void *handle, const char *function, const Reference references[], size_t n,
                              const int32_t orders[], double values[], size_t n_values)
 {
-    Instance *instance = enter(handle, function, MODE_STEP | MODE_INTERMEDIATE | MODE_TERMINATED);
+    const int modes = MODE_STEP | MODE_INTERMEDIATE | MODE_TERMINATED;
+    Instance *instance = enter_kind(handle, function, CO_SIMULATION, modes);
     double *places[N_SEEDS];
     const Direction wanted = {.references = references, .n = n, .results = values, .n_values = n_values};
     if (!instance || check_direction(instance, function, &wanted, false) != ANSWER_OK)
@@ -125,6 +126,9 @@ Answer instance_output_rates(void *handle, const char *function, const Reference
         places[SEED_STATES][i] = rates[i];
     if (!engine_forward(engine, view_now(instance), places))
         return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+    if (!all_finite(&wanted, false, places))
+        return refuse(instance, "%s: %s: the derivatives are not finite at t = %.17g.", instance->name, function,
+                      instance->run->time);
     gather(&wanted, false, places);
     return ANSWER_OK;
 }
