@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import importlib
-import inspect
 import os
 import re
 import sys
@@ -17,8 +16,9 @@ from typing import Any
 from cosim.cli.exits import Exit, UsageError, progress, start_values
 from fmu.build import check_target
 from fmu.errors import ExportError
-from fmu.export import Fmi, export_fmu
+from fmu.export import export_fmu
 from fmu.platforms import PLATFORMS
+from fmu.variables import Fmi
 from hybrid_model import Automaton
 from hybrid_model.consensus.network import scenario_agents
 from hybrid_model.consensus.scenario import load_scenario
@@ -71,19 +71,19 @@ def run(options: argparse.Namespace) -> int:
         files = {name: options.out / f"{_file_name(name)}.fmu" for name in automata}
         for file in files.values():
             check_target(file)
-        settings = {
-            "fmi": options.fmi,
-            "kinds": tuple(kind for kind in KINDS if kind in (options.kind or KINDS)),
-            "platforms": _platforms(options.platform),
-            "stop_time": stop_time if options.stop_time is None else options.stop_time,
-            "step_size": options.step_size,
-            "progress": progress,
-        }
-        known = inspect.signature(export_fmu).parameters
         for count, (name, automaton) in enumerate(automata.items(), 1):
             progress(f"exporting {name} ({count} of {len(automata)})")
-            given = {option: value for option, value in settings.items() if option in known}
-            print(export_fmu(automaton, files[name], **given))
+            written = export_fmu(
+                automaton,
+                files[name],
+                fmi=options.fmi,
+                kinds=tuple(kind for kind in KINDS if kind in (options.kind or KINDS)),
+                platforms=_platforms(options.platform),
+                stop_time=stop_time if options.stop_time is None else options.stop_time,
+                step_size=options.step_size,
+                progress=progress,
+            )
+            print(written)
     return Exit.DONE
 
 

@@ -12,7 +12,8 @@ import pytest
 from catalogue import cases
 
 from fmu.build import RUNTIME, find_compiler, fmi_headers
-from fmu.export import Fmi, export_fmu
+from fmu.export import export_fmu
+from fmu.variables import Fmi
 from hybrid_model.models import BouncingBall
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="reads ELF files by the tools of binutils")

@@ -21,9 +21,9 @@ import fmu.libraries
 from fmu.build import BuildError, compile_fmu, fmi_headers
 from fmu.check.binary import read_binary
 from fmu.compiler import cache_folder, is_zig
-from fmu.export import Fmi
 from fmu.macho import export_only, universal
 from fmu.platforms import PLATFORMS, chosen_platforms, library_members, this_platform
+from fmu.variables import Fmi
 
 VERSION = """
 #include "fmi3Functions.h"
