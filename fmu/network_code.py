@@ -76,10 +76,10 @@ class NetworkCode:
             + most[Kind.PARAMETER]
         )
         return (
-            _ARG + max(function.sz_arg() for function in functions),
-            _RES + max(function.sz_res() for function in functions),
-            max(function.sz_iw() for function in functions),
-            own + max(function.sz_w() for function in functions),
+            _ARG + max((function.sz_arg() for function in functions), default=0),
+            _RES + max((function.sz_res() for function in functions), default=0),
+            max((function.sz_iw() for function in functions), default=0),
+            own + max((function.sz_w() for function in functions), default=0),
         )
 
     def text(self) -> str:

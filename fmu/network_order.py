@@ -159,6 +159,7 @@ class _Ordering:
             """Calls whose outputs, and members whose states, a call reads."""
             assert call.piece is not None
             inputs = self._inputs_of(call.member, call.piece.first, call.piece.count)
+            self._require_own(self.members.members[call.member], inputs)
             sources = self._sources(call.member, inputs)
             states = {member_of_state[source] for source in sources if source in member_of_state}
             return tuple(self._read(sources, call_of)), (call.member, *states)
@@ -210,7 +211,7 @@ class _Ordering:
         """Refuse start values that use inputs of a nested network: it reads them before any of its parts start."""
         first = member.first[Kind.INPUT]
         if any(self.members.crossing[first + k] for k in inputs):
-            raise NotLoopable(f"The start values of {member.path} depend on a signal from outside its own network.")
+            raise NotLoopable(f"Start values depend, in {member.path}, on a signal from outside its own network.")
 
 
 def _span(call: Call) -> range:

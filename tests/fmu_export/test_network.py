@@ -291,6 +291,24 @@ def test_start_values_across_the_border_of_a_nested_network():
 
     inner = hm.Composition("inner", {f"p{k}": Starts(f"p{k}") for k in range(14)})
     outer = hm.Composition("outer", {"inner": inner, "end": Part("end")}, {"inner.p3.u": "inner.p1.z"})
-    with pytest.raises(NotLoopable, match=r"start values of inner\.p3"):
+    with pytest.raises(NotLoopable, match=r"Start values depend, in inner\.p3"):
         network_trace(outer)
     assert isinstance(trace_any(outer), Trace)
+
+    # Also by way of an output inside.
+    inner = hm.Composition(
+        "inner", {f"p{k}": Starts(f"p{k}") for k in range(14)} | {"sums": Sums()}, {"p4.u": "sums.y"}
+    )
+    outer = hm.Composition("outer", {"inner": inner, "end": Part("end")}, {"inner.sums.a": "inner.p1.z"})
+    with pytest.raises(NotLoopable, match=r"Start values depend, in inner\.sums"):
+        network_trace(outer)
+
+
+def test_a_network_of_next_to_nothing():
+    """Parts without states, inputs, outputs or jumps have no maps to call."""
+    Still = type("Still", (hm.HybridAutomaton,), {"p": hm.Parameter(1.0)})
+    traced = network_trace(hm.Composition("still", {"a": Still("a"), "b": Still("b")}))
+    assert [len(group.members) for group in traced.groups] == [2]
+    assert traced.work_sizes[:2] == (10, 5)
+    assert traced.pattern("flow", "p").shape == (0, 2)
+    assert "hybrid_reset" in traced.c_code()

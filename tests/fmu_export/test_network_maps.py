@@ -193,12 +193,13 @@ def matrices():
 
 def nested():
     """A network inside a network, with names of its own, driven from outside and driving."""
-    parts = followers(14)
-    wires = {f"f{k}.u": f"f{k - 1}.x" for k in range(3, 15)}
-    inner = hm.Composition("inner", parts, wires, {"f1.x": "first", "f14.y": "last", "f2.offset": "shift"})
-    ball = BouncingBall(h=0.7)
-    outer = {"ball": ball, "inner": inner, "end": Mean(size=2)}
-    return hm.Composition("outer", outer, {"end.all": ["inner.last", "ball.h"], "end.more": "inner.first"})
+    parts = {**followers(14), "mean": Mean(size=2)}
+    wires = {f"f{k}.u": f"f{k - 1}.x" for k in range(3, 15)} | {"mean.all": ["f7.x", "f9.y"]}
+    names = {"f1.x": "first", "f14.y": "last", "f2.offset": "shift", "mean.more": "drive"}
+    inner = hm.Composition("inner", parts, wires, names)
+    outer = {"ball": BouncingBall(h=0.7), "inner": inner, "end": Mean(size=3)}
+    wires = {"end.all": ["inner.last", "ball.h", "inner.mean.mean"], "end.more": "inner.first", "inner.drive": "ball.h"}
+    return hm.Composition("outer", outer, wires)
 
 
 def one_broadcast():
