@@ -98,8 +98,10 @@ class Report:
     findings: list[Finding] = field(default_factory=list)
 
     def extend(self, findings: Iterable[Finding]) -> None:
-        """Add findings; beyond `LIMIT` of one rule they are counted only."""
+        """Add findings, equal ones once; beyond `LIMIT` of one rule they are counted only."""
         for finding in findings:
+            if finding in self.findings:
+                continue
             same = sum(1 for known in self.findings if known.rule == finding.rule)
             if same < LIMIT:
                 self.findings.append(finding)

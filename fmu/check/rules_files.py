@@ -16,6 +16,7 @@ SOURCES = "FMI 2.0.4 section 2.3; FMI 3.0.2 section 2.5.1.4"
 TERMINALS = "FMI 3.0.2 section 2.4.9"
 LAYERED = "FMI 3.0.2 section 2.6"
 _TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"
+_MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"
 _BUILD = "sources/buildDescription.xml"
 _CONNECTED = ("input", "output", "parameter", "calculatedParameter")
 _PACKED = (".zip", ".fmu", ".ssp", ".gz", ".xz", ".7z", ".tar", ".bz2")
@@ -34,20 +35,39 @@ def file_findings(archive: Archive, description: Description) -> Iterator[Findin
         yield from _terminals(archive, description)
     for name in archive.names:
         if name.startswith("extra/") and name.endswith("/fmi-ls-manifest.xml"):
-            yield from _checked(archive, name, "fmi3/fmi3LayeredStandardManifest.xsd")[1]
+            yield from _manifest(archive, name)
 
 
-def _checked(archive: Archive, name: str, schema: str) -> tuple[etree._Element | None, list[Finding]]:
-    """Return a file's tree if it is sound, and what is wrong with it."""
+def _tree(archive: Archive, name: str) -> tuple[etree._Element | None, list[Finding]]:
+    """Return a file's tree if it is sound XML, and what is wrong with it."""
     try:
         require_size(archive.size(name), name)
-        root = parse(archive.read(name), name)
+        return parse(archive.read(name), name), []
     except XmlError as problem:
         return None, [problem.finding]
     except ArchiveError as problem:
         return None, [error(f"archive.{rule}", sentence) for rule, sentence in problem.problems]
-    findings = schema_findings(root, name, schema)
+
+
+def _checked(archive: Archive, name: str, schema: str) -> tuple[etree._Element | None, list[Finding]]:
+    """Return a file's tree if it is sound and fits its schema, and what is wrong with it."""
+    root, findings = _tree(archive, name)
+    if root is not None:
+        findings = schema_findings(root, name, schema)
     return (None if findings else root), findings
+
+
+def _manifest(archive: Archive, name: str) -> Iterator[Finding]:
+    # The standard asks for three attributes and leaves root element and content to the layered standard.
+    root, findings = _tree(archive, name)
+    yield from findings
+    if root is None:
+        return
+    for attribute in ("fmi-ls-name", "fmi-ls-version", "fmi-ls-description"):
+        if root.get(f"{{{_MANIFEST}}}{attribute}") is None:
+            yield error(
+                "layered.manifest", f"{name} has no attribute {attribute} of the namespace {_MANIFEST}.", LAYERED
+            )
 
 
 def _source_files(archive: Archive, description: Description) -> Iterator[Finding]:

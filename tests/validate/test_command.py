@@ -10,6 +10,8 @@ from small_fmus import DESCRIPTIONS, members, only, write
 
 from cosim.cli.main import main
 from fmu.check.fmu_file import check_fmu
+from fmu.export import export_fmu
+from hybrid_model.models import BouncingBall
 
 
 def run(capsys, *arguments):
@@ -110,6 +112,14 @@ def test_the_static_part_loads_no_native_code_of_the_fmu(tmp_path):
 @pytest.mark.parametrize("name", ["bouncing_ball", "thermostat", "integrator", "switching"])
 def test_own_exports_are_sound(name, exported):
     require_sound(check_fmu(exported(cases()[name].automaton, name)))
+
+
+def test_an_own_fmi_2_export_is_sound_and_its_messages_are_read(tmp_path):
+    """The ball comes to rest within the experiment; FMI 2 tells why by a format and its argument."""
+    report = check_fmu(export_fmu(BouncingBall(), tmp_path / "ball.fmu", fmi="2.0", stop_time=3.0))
+    assert report.executed == report.kinds == ("CoSimulation", "ModelExchange")
+    assert {finding.rule for finding in report.findings} == {"run.discard"}
+    assert all("Zeno" in finding.message for finding in report.findings)
 
 
 @pytest.mark.long

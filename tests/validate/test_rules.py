@@ -226,6 +226,16 @@ def test_build_descriptions(fields, rules, tmp_path):
     assert wrong(check(tmp_path, DESCRIPTIONS[3], files)) == rules
 
 
+def test_manifests_of_layered_standards_have_three_attributes_and_any_root(tmp_path):
+    name, space = "extra/org.x/fmi-ls-manifest.xml", 'xmlns:l="http://fmi-standard.org/fmi-ls-manifest"'
+    sound = f'<anything {space} l:fmi-ls-name="org.x" l:fmi-ls-version="1" l:fmi-ls-description="d"><more/></anything>'
+    assert wrong(check(tmp_path, DESCRIPTIONS[3], {name: sound})) == set()
+    assert wrong(check(tmp_path, DESCRIPTIONS[3], {name: sound.replace("l:fmi-ls-name", "fmi-ls-name")})) == {
+        "layered.manifest"
+    }
+    assert wrong(check(tmp_path, DESCRIPTIONS[3], {name: sound.replace(space, "")})) == {"xml.syntax"}
+
+
 def test_sources_that_nobody_can_build(tmp_path):
     assert wrong(check(tmp_path, DESCRIPTIONS[3], {"sources/a.c": ""})) == {"source.description"}
     text = edited(

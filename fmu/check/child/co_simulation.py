@@ -67,10 +67,7 @@ class CoSimulation(Run):
             )
             self.ended = True
         elif step.terminate:
-            self.recorder.find(
-                "note", "run.ended", f"The FMU ends the simulation at t = {self.t!r} ({self.fmu.said()})."
-            )
-            self.ended = True
+            self.end()
         elif self.fmu.events and (step.event or (self.next_time is not None and self.t >= self.next_time)):
             self.fmu.do("EnterEventMode")
             self.iterate()

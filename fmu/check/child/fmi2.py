@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes as c
+import platform
 import sys
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,9 @@ TYPES: dict[str, tuple[str, Any]] = {
     "Boolean": ("Boolean", c.c_int),
     "String": ("String", c.c_char_p),
 }
-_LOGGER = c.CFUNCTYPE(None, c.c_void_p, c.c_char_p, c.c_int, c.c_char_p, c.c_char_p)
+# The logger is variadic.  Where variable arguments are passed as fixed ones are, the first of them can be read here.
+_LOGGER = c.CFUNCTYPE(None, c.c_void_p, c.c_char_p, c.c_int, c.c_char_p, c.c_char_p, c.c_void_p)
+_READS_ARGUMENTS = not (sys.platform == "darwin" and platform.machine() == "arm64")
 _ALLOCATE = c.CFUNCTYPE(c.c_void_p, c.c_size_t, c.c_size_t)
 _FREE = c.CFUNCTYPE(None, c.c_void_p)
 _FINISHED = c.CFUNCTYPE(None, c.c_void_p, c.c_int)
@@ -55,7 +58,7 @@ class Fmi2(Library):
         # The memory functions are the C library's own: a Python function between would be the check's, not the FMU's.
         memory = c.CDLL("msvcrt" if sys.platform == "win32" else None)
         self._callbacks = _Callbacks(
-            _LOGGER(lambda environment, name, status, category, message: self.logged(message)),
+            _LOGGER(lambda environment, name, status, category, message, first: self.logged(_filled(message, first))),
             c.cast(memory.calloc, _ALLOCATE),
             c.cast(memory.free, _FREE),
             _FINISHED(0),
@@ -201,6 +204,11 @@ class Fmi2(Library):
         orders = (c.c_int * len(references))(*[1] * len(references))
         self.do("GetRealOutputDerivatives", array, c.c_size_t(len(references)), orders, found)
         return list(found)
+
+
+def _filled(message: bytes | None, first: int | None) -> bytes | None:
+    """Return a message; the format "%s", which careful FMUs use, is filled with its argument."""
+    return c.string_at(first) if message == b"%s" and first and _READS_ARGUMENTS else message
 
 
 _VECTORS = {

@@ -65,16 +65,12 @@ class ModelExchange(Run):
         if self.plan["completed_step"]:
             event, terminate = self.fmu.completed_step()
         if terminate:
-            self.ended = True
+            self.end()
         elif event or crossed or (self.next_time is not None and self.t >= self.next_time):
             self.fmu.do("EnterEventMode")
             self.iterate()
             if not self.ended:
                 self._go_on()
-        if self.ended:
-            self.recorder.find(
-                "note", "run.ended", f"The FMU ends the simulation at t = {self.t!r} ({self.fmu.said()})."
-            )
 
     def mark(self) -> tuple[Any, ...]:
         """See `Run.mark`."""

@@ -42,7 +42,8 @@ class Run:
         next_time = None
         for _ in range(ITERATIONS):
             again, terminate, next_time = self.fmu.update()
-            self.ended = self.ended or terminate
+            if terminate:
+                self.end()
             if not again or self.ended:
                 break
         else:
@@ -56,6 +57,11 @@ class Run:
             )
             next_time = None
         self.next_time = next_time
+
+    def end(self) -> None:
+        """Take note that the FMU ends the simulation."""
+        self.ended = True
+        self.recorder.find("note", "run.ended", f"The FMU ends the simulation at t = {self.t!r} ({self.fmu.said()}).")
 
     def read_all(self) -> list[bytes]:
         """Read every declared variable, twice: reading must change nothing."""
