@@ -39,7 +39,7 @@ class Exchange:
         self.n_indicators = len(component.binary.description.eventIndicators or ())
         if self.binary.version == 2:
             self.n_indicators = self.binary.description.numberOfEventIndicators
-        self.t = 0.0
+        self.t, self.update = 0.0, None
 
     def put(self, t, x):
         self.component.do("SetTime", c.c_double(t))
@@ -86,13 +86,14 @@ class Exchange:
         `changes` are inputs to be set at points: (time, name, value).
         """
         component, samples, events, idle = self.component, [], [], []
+        self.update = update
         self.t, x = points[0], self.states()
         samples.append((self.t, x))
         for point in points[1:]:
             while self.t < point:
                 target = min(point, self.t + STEP)
-                if update.next_time is not None:
-                    target = min(target, update.next_time)
+                if self.update.next_time is not None:
+                    target = min(target, self.update.next_time)
                 k1 = self.flow(self.t, x)
                 before = self.indicators(self.t, x) > 0
                 new = self.reach(x, k1, target - self.t)
@@ -106,14 +107,14 @@ class Exchange:
                 if terminate:
                     return Record(samples, events, idle, True)
                 here = [change for change in changes if change[0] == self.t]
-                if found or event or here or self.t == update.next_time:
+                if found or event or here or self.t == self.update.next_time:
                     component.do("EnterEventMode")
                     for _, name, value in here:
                         component.set(name, value)
                     n_jumps = len(component.jumps)
-                    update = component.settle()
+                    self.update = component.settle()
                     (events if len(component.jumps) > n_jumps else idle).append(self.t)
-                    if update.terminate:
+                    if self.update.terminate:
                         return Record(samples, events, idle, True)
                     x = self.states()
             samples.append((self.t, x))

@@ -9,16 +9,10 @@ from functools import partial
 from typing import NamedTuple
 
 import pytest
-from fmu_driver2 import DISCARD, ERROR, OK, Binary, Component, EventInfo, doubles, references
+from fmu_driver2 import DISCARD, ERROR, OK, Binary, EventInfo, doubles, references
+from fmu_driver_journey import SETTINGS, instance
 from witnesses import Ramps
 
-SETTINGS = {
-    "2.0 CS": {"fmi": "2.0", "kind": "cs"},
-    "2.0 ME": {"fmi": "2.0", "kind": "me"},
-    "3.0 CS": {"fmi": "3.0", "kind": "cs", "events": True, "early": True},
-    "3.0 CS without events": {"fmi": "3.0", "kind": "cs"},
-    "3.0 ME": {"fmi": "3.0", "kind": "me"},
-}
 SETTLED = {"event", "step", "continuous"}
 RUNNING = SETTLED | {"initialization", "terminated"}
 ANY = RUNNING | {"instantiated", "configuration"}
@@ -219,9 +213,8 @@ def modes_of(setting):
     return [*modes, "continuous" if setting["kind"] == "me" else "step"]
 
 
-def in_mode(binary, setting, mode):
-    options = {key: value for key, value in setting.items() if key != "fmi"}
-    component = Component(binary, **options)
+def in_mode(binaries, label, mode):
+    component = instance(binaries, label)
     if mode == "configuration":
         component.do("EnterConfigurationMode")
     elif mode != "instantiated":
@@ -259,7 +252,7 @@ def test_calls_are_allowed_in_their_modes_only(label, row, binaries):
     setting, case, name = SETTINGS[label], TABLE[row], row.strip()
     allowed = case.cs if setting["kind"] == "cs" else case.me
     for mode in modes_of(setting):
-        component = in_mode(binaries[setting["fmi"]], setting, mode)
+        component = in_mode(binaries, label, mode)
         # Without events there is no Event Mode to enter, whatever the mode.
         legal = mode in allowed and not (name == "EnterEventMode" and label == "3.0 CS without events")
         found = component.call(name, *case.arguments(component))
@@ -283,7 +276,7 @@ def test_null_pointers_are_refused(label, row, binaries):
     binary = binaries[setting["fmi"]]
     allowed = case.cs if setting["kind"] == "cs" else case.me
     mode = next((mode for mode in modes_of(setting) if mode in allowed), "initialization")
-    component = in_mode(binary, setting, mode)
+    component = in_mode(binaries, label, mode)
     arguments = case.arguments(component)
     function = getattr(binary.functions, binary.function(name))
     assert function(c.c_void_p(None), *arguments) == ERROR
@@ -326,7 +319,7 @@ def test_freeing_in_every_mode_and_freeing_nothing(label, binaries):
     setting = SETTINGS[label]
     binary = binaries[setting["fmi"]]
     for mode in modes_of(setting):
-        close(in_mode(binary, setting, mode))
+        close(in_mode(binaries, label, mode))
     getattr(binary.functions, binary.function("FreeInstance"))(c.c_void_p(None))
 
 
@@ -334,7 +327,7 @@ def test_freeing_in_every_mode_and_freeing_nothing(label, binaries):
 def test_only_inputs_are_set_while_running(label, binaries):
     setting = SETTINGS[label]
     for mode in modes_of(setting):
-        component = in_mode(binaries[setting["fmi"]], setting, mode)
+        component = in_mode(binaries, label, mode)
         settable = mode in ("instantiated", "initialization")
         for name in ("limit_a", "a", "count_a"):
             assert (mode, component.try_set(name, 1)) == (mode, OK if settable else ERROR)
