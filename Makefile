@@ -6,16 +6,20 @@ READY := $(VENV)/.ready
 # Threads cost more than they give on matrices of some ten rows.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: run test test-long benchmark lint format clean
+.PHONY: run test test-long faults benchmark lint format clean
 
 run: $(READY)
 	$(BIN)/hybrid-fmu paper --out results
 
 test: lint
-	$(BIN)/python -m pytest -n 2 -m "not long"
+	$(BIN)/python -m pytest -n 2 -m "not long and not faults"
 
 test-long: $(READY)
-	$(BIN)/python -m pytest -n 2 -m long
+	$(BIN)/python -m pytest -n 2 -m "long and not faults"
+
+# Needs valgrind and the sanitizers of gcc or clang.
+faults: $(READY)
+	$(BIN)/python -m pytest -n 2 -m faults
 
 # Prints the tables of docs/benchmarks.md.
 benchmark: $(READY)
