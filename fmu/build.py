@@ -116,7 +116,7 @@ def binaries(
     libraries = build_libraries(
         _checked(sources), RUNTIME, _folders(include_dirs), _compiler_for(chosen), chosen, progress
     )
-    return library_members(identifier, fmi, libraries)
+    return library_members(identifier, fmi, libraries, only_here=platforms is None)
 
 
 def compile_fmu(

@@ -2,7 +2,8 @@
 
 FMI 3 names a folder after processor and system. FMI 2 has names of its own for x86 processors and takes over those of
 FMI 3 for all others (FMI 2.0.4, section 2.3). Importers of FMI 2 on other processors mostly look into the folders
-for x86 all the same, so these hold what such a machine can load, as far as that harms no machine with an x86 processor.
+for x86 all the same. On macOS one library serves both; and an FMU made on such a machine for that machine alone has
+its library in both folders.
 """
 
 from __future__ import annotations
@@ -114,7 +115,9 @@ def chosen_platforms(names: Iterable[str] | None) -> tuple[Platform, ...]:
     return tuple(entry for name, entry in PLATFORMS.items() if name in wanted)
 
 
-def library_members(identifier: str, fmi: str, libraries: Mapping[Platform, bytes]) -> dict[str, bytes]:
+def library_members(
+    identifier: str, fmi: str, libraries: Mapping[Platform, bytes], *, only_here: bool = False
+) -> dict[str, bytes]:
     """Give libraries their names in the archive.
 
     Parameters
@@ -125,6 +128,8 @@ def library_members(identifier: str, fmi: str, libraries: Mapping[Platform, byte
         ``"2.0"`` or ``"3.0"``.
     libraries : mapping of Platform to bytes
         What was built.
+    only_here : bool
+        Whether the FMU is for this machine alone, so that its importers' habits count more than other machines.
 
     Returns
     -------
@@ -136,17 +141,18 @@ def library_members(identifier: str, fmi: str, libraries: Mapping[Platform, byte
     for entry, library in libraries.items():
         folders[entry.fmi2_folder if fmi == "2.0" and entry.is_x86 else entry.name] = library
     if fmi == "2.0":
-        folders |= _for_importers_that_ignore_the_processor(libraries)
+        folders |= _for_importers_that_ignore_the_processor(libraries, only_here)
     return {f"binaries/{name}/{identifier}{extensions[name]}": folders[name] for name in sorted(folders)}
 
 
-def _for_importers_that_ignore_the_processor(libraries: Mapping[Platform, bytes]) -> dict[str, bytes]:
+def _for_importers_that_ignore_the_processor(libraries: Mapping[Platform, bytes], only_here: bool) -> dict[str, bytes]:
     """Return what goes into FMI 2's folders for x86 because of other processors."""
     folders = {}
     for entry, library in libraries.items():
         twins = [other for other in libraries if other.system == entry.system and other.is_x86]
-        if entry.is_x86 or (twins and entry.system != "darwin"):
+        if entry.is_x86:
             continue
         # One file can hold the code for both processors on macOS only.
-        folders[entry.fmi2_folder] = universal([*(libraries[twin] for twin in twins), library])
+        if (twins and entry.system == "darwin") or only_here:
+            folders[entry.fmi2_folder] = universal([*(libraries[twin] for twin in twins), library])
     return folders

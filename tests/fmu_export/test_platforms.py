@@ -70,10 +70,13 @@ def test_fmi_2_has_names_of_its_own_for_x86():
     assert both == universal([macho("x86_64-darwin"), macho("aarch64-darwin")])
 
 
-def test_importers_of_fmi_2_that_ignore_the_processor_find_a_library_too():
-    """fmpy looks into linux64 on all 64-bit machines; where x86 has no library, that folder is free."""
-    assert members(["aarch64-linux"], "2.0") == dict.fromkeys(
-        ("binaries/aarch64-linux/Model.so", "binaries/linux64/Model.so"), macho("aarch64-linux")
+def test_importers_of_fmi_2_that_ignore_the_processor_find_what_was_made_on_their_machine():
+    """fmpy looks into linux64 on all 64-bit machines, where the standard has code for x86."""
+    library = {PLATFORMS["aarch64-linux"]: b"code"}
+    assert library_members("Model", "2.0", library) == {"binaries/aarch64-linux/Model.so": b"code"}
+    assert library_members("Model", "3.0", library, only_here=True) == {"binaries/aarch64-linux/Model.so": b"code"}
+    assert library_members("Model", "2.0", library, only_here=True) == dict.fromkeys(
+        ("binaries/aarch64-linux/Model.so", "binaries/linux64/Model.so"), b"code"
     )
 
 
