@@ -5,13 +5,17 @@ import itertools
 import casadi as ca
 import numpy as np
 import pytest
+from catalogue import cases
 from description_cases import BOTH, described
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybrid_model as hm
 from fmu.description_factors import Factor, factors
-from fmu.variables import Bank, Fmi
+from fmu.description_structure import model_structure
+from fmu.network import network_trace
+from fmu.trace import trace
+from fmu.variables import Bank, Fmi, fmu_variables
 from hybrid_model.models import BouncingBall
 
 
@@ -193,3 +197,18 @@ def test_kinds_hold_for_numbers(trees, seed):
 def _value(function, point):
     parts = np.split(point, np.cumsum([argument.numel() for argument in ARGUMENTS])[:-1])
     return np.asarray(function(*parts)).ravel()
+
+
+@pytest.mark.parametrize("name", ["paper_dynamic", "firefly_network", "juggled_ball"])
+def test_a_network_of_tables_has_the_structure_of_the_whole(name):
+    """The dependencies chained over the wires are those of the composed expressions; only their kinds are not known."""
+    automaton = cases()[name].automaton
+    whole, tables = trace(automaton), network_trace(automaton)
+    for fmi in BOTH:
+        variables = fmu_variables(whole, fmi)
+        expected, found = model_structure(whole, variables), model_structure(tables, variables)
+        for part in ("outputs", "derivatives", "initial", "indicators"):
+            assert [(u.variable, u.dependencies) for u in getattr(found, part)] == [
+                (u.variable, u.dependencies) for u in getattr(expected, part)
+            ]
+            assert all(u.kinds is None for u in getattr(found, part))
