@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from fmu.derivatives import derivative_functions
+from fmu.network import NetworkTrace
 from fmu.trace import Trace
 from fmu.variables import FmuVariable
 from hybrid_model.transitions import Priority, Trigger
@@ -26,12 +27,14 @@ _OPTIONS: dict[str, Any] = {
 }
 
 
-def model_code(traced: Trace, variables: Sequence[FmuVariable], token: str, kinds: Collection[str]) -> str:
+def model_code(
+    traced: Trace | NetworkTrace, variables: Sequence[FmuVariable], token: str, kinds: Collection[str]
+) -> str:
     """Return the C source of a model.
 
     Parameters
     ----------
-    traced : Trace
+    traced : Trace or NetworkTrace
         The automaton's maps.
     variables : sequence of FmuVariable
         In the order of their value references.
@@ -50,8 +53,10 @@ def model_code(traced: Trace, variables: Sequence[FmuVariable], token: str, kind
     return "\n".join([maps, *tables])
 
 
-def _maps(traced: Trace) -> tuple[str, Sequence[int]]:
+def _maps(traced: Trace | NetworkTrace) -> tuple[str, Sequence[int]]:
     """Return the definitions of the maps and of their derivatives, and the sizes of the work arrays they need."""
+    if isinstance(traced, NetworkTrace):
+        return traced.c_code(), traced.work_sizes
     functions = [*traced.functions, *derivative_functions(traced).values()]
     generator = ca.CodeGenerator("model", _OPTIONS)
     for function in functions:
@@ -63,6 +68,8 @@ def _maps(traced: Trace) -> tuple[str, Sequence[int]]:
 
 _MAPS = ("start", "flow", "flow_set", "margins", "times", "outputs", "reset")
 _MAPS += ("forward", "reverse", "start_forward", "start_reverse")
+_LONGEST_LITERAL = 60_000
+"""Some compilers take no longer strings."""
 _RESET = """\
 static int hybrid_reset(size_t jump, const double **arg, double **res, long long *iw, double *w)
 {
@@ -85,46 +92,72 @@ def _number(value: float) -> str:
 
 def _array(kind: str, name: str, items: Iterable[str]) -> str:
     # C has no empty arrays: a table without entries gets one that is never read.
-    entries = list(items) or [
-        "0" if "char" in kind or "size_t" in kind or "double" in kind or "Function" in kind else "{0}"
-    ]
+    entries = list(items) or ["{0}" if kind in ("ModelJump ", "ModelVariable ") else "0"]
     return f"static const {kind}{name}[] = {{\n    " + ",\n    ".join(entries) + "\n};\n"
 
 
-def _tables(traced: Trace, variables: Sequence[FmuVariable]) -> list[str]:
-    automaton, layout = traced.automaton, traced.layout
+class _Names:
+    """The names of a model in one text: the tables hold places in it."""
+
+    def __init__(self) -> None:
+        self._places: dict[str, int] = {}
+        self._size = 0
+
+    def place(self, name: str) -> str:
+        """Return where a name begins."""
+        if name not in self._places:
+            self._places[name] = self._size
+            self._size += len(name.encode()) + 1
+        return str(self._places[name])
+
+    def table(self) -> str:
+        """Return the definition of the text, which must come after all names are placed."""
+        if self._size <= _LONGEST_LITERAL:
+            lines = [f'{string(name)[:-1]}\\0"' for name in self._places]
+            return "static const char names[] =\n    " + "\n    ".join(lines or ['""']) + ";\n"
+        octets = b"".join(name.encode() + b"\0" for name in self._places)
+        rows = (",".join(map(str, octets[k : k + 32])) for k in range(0, len(octets), 32))
+        return _array("char ", "names", rows)
+
+
+def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> list[str]:
+    automaton, layout, names = traced.automaton, traced.layout, _Names()
     starts = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
     margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
-    return [
+    tables = [
         *(_array("double ", f"start_{name}", map(_number, layout.start(kind))) for name, kind in starts),
-        _array("char *const ", "state_names", map(string, layout.names(Kind.STATE))),
-        _array("char *const ", "discrete_names", map(string, layout.names(Kind.DISCRETE))),
-        _array("char *const ", "margin_names", map(string, margin_names)),
-        _array("ModelJump ", "jumps", _jumps(traced)),
+        _array("ModelName ", "state_names", map(names.place, layout.names(Kind.STATE))),
+        _array("ModelName ", "discrete_names", map(names.place, layout.names(Kind.DISCRETE))),
+        _array("ModelName ", "margin_names", map(names.place, margin_names)),
+        _array("ModelJump ", "jumps", _jumps(traced, names)),
         _array("size_t ", "clock_jump", (str(clock.jump) for clock in automaton.clocks)),
-        _array("ModelVariable ", "variables", map(_variable, variables)),
+        _array("ModelVariable ", "variables", (_variable(variable, names) for variable in variables)),
     ]
+    return [*tables, names.table()]
 
 
-def _jumps(traced: Trace) -> list[str]:
+def _jumps(traced: Trace | NetworkTrace, names: _Names) -> list[str]:
     rows = []
     counts = {Trigger.STATE: 0, Trigger.TIME: 0}
     for info in traced.automaton.jumps:
         kind = "JUMP_ON_STATE" if info.trigger is Trigger.STATE else "JUMP_ON_TIME"
-        internal = "true" if info.internal else "false"
-        rows.append(f"{{{string(info.name)}, {kind}, {counts[info.trigger]}, {internal}}}")
+        rows.append(f"{{{names.place(info.name)}, {kind}, {counts[info.trigger]}, {_bool(info.internal)}}}")
         counts[info.trigger] += 1
     return rows
 
 
-def _variable(variable: FmuVariable) -> str:
-    flags = ", ".join("true" if flag else "false" for flag in (variable.discrete, variable.calculated))
-    place = f"{variable.bank.value}, {variable.index}, {variable.size}"
-    return f"{{{string(variable.name)}, {variable.type.value}, {place}, {flags}}}"
+def _variable(variable: FmuVariable, names: _Names) -> str:
+    flags = f"{_bool(variable.discrete)}, {_bool(variable.calculated)}"
+    place = f"{names.place(variable.name)}, {variable.index}, {variable.size}"
+    return f"{{{place}, {variable.type.value}, {variable.bank.value}, {flags}}}"
 
 
 def _model(
-    traced: Trace, variables: Sequence[FmuVariable], token: str, kinds: Collection[str], work: Sequence[int]
+    traced: Trace | NetworkTrace,
+    variables: Sequence[FmuVariable],
+    token: str,
+    kinds: Collection[str],
+    work: Sequence[int],
 ) -> str:
     automaton, sizes = traced.automaton, traced.layout.sizes
     fields = {
@@ -149,7 +182,7 @@ def _model(
         **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
         **{name: f"hybrid_{name}" for name in _MAPS},
         **{name: name for name in ("jumps", "clock_jump", "variables")},
-        **{name: name for name in ("state_names", "discrete_names", "margin_names")},
+        **{name: name for name in ("state_names", "discrete_names", "margin_names", "names")},
     }
     return "const Model model = {\n" + "".join(f"    .{key} = {value},\n" for key, value in fields.items()) + "};\n"
 

@@ -12,8 +12,8 @@ from fmu.build import RUNTIME, binaries, fmi_headers, package, runtime_sources
 from fmu.code import model_code
 from fmu.description import model_description, model_identifier
 from fmu.errors import ExportError
+from fmu.network import trace_any
 from fmu.package import check_target
-from fmu.trace import trace
 from fmu.variables import Fmi, fmu_variables
 from hybrid_model import Automaton
 
@@ -69,7 +69,7 @@ def export_fmu(
     version, target = _version(fmi), Path(path)
     chosen = _kinds(kinds)
     check_target(target)
-    traced = trace(automaton)
+    traced = trace_any(automaton)
     variables = fmu_variables(traced, version)
     runtime = runtime_sources(version.value)
 

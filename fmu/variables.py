@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from fmu.errors import ExportError
+from fmu.network import NetworkTrace
 from fmu.trace import Trace
 from fmu.units import unit_per_second
 from hybrid_model import Automaton
@@ -127,12 +128,12 @@ _BANKS = {
 }
 
 
-def fmu_variables(traced: Trace, fmi: Fmi = Fmi.V3_0) -> tuple[FmuVariable, ...]:
+def fmu_variables(traced: Trace | NetworkTrace, fmi: Fmi = Fmi.V3_0) -> tuple[FmuVariable, ...]:
     """List the variables of an FMU: time, parameters, inputs, outputs, states, derivatives, margins, clocks.
 
     Parameters
     ----------
-    traced : Trace
+    traced : Trace or NetworkTrace
         The automaton; its discrete states declared internal are not listed.
     fmi : Fmi
         Version of the standard.

@@ -37,15 +37,15 @@ static Answer check_access(const Instance *instance, const char *function, Type 
         const ModelVariable *variable = &model.variables[references[i]];
         if (variable->type != type)
             return refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.",
-                          instance->name, function, variable->name, type_name(variable->type));
+                          instance->name, function, name_at(&model, variable->name), type_name((Type)variable->type));
         if (set && !may_be_set(variable, instance->run->mode))
             return refuse(instance, "%s: %s: '%s' cannot be set in the state '%s'.", instance->name, function,
-                          variable->name, mode_name(instance->run->mode));
+                          name_at(&model, variable->name), mode_name(instance->run->mode));
         needed += variable->size;
     }
     if (n_values != needed)
-        return refuse(instance, "%s: %s: %zu values were given room for, but the %zu variables have %zu.",
-                      instance->name, function, n_values, n, needed);
+        return refuse(instance, "%s: %s: %zu values for %zu elements of the %zu variables.", instance->name, function,
+                      n_values, needed, n);
     return ANSWER_OK;
 }
 
@@ -70,7 +70,7 @@ static const double *elements(const Instance *instance, const ModelVariable *var
     const double *values = engine_values(instance->engine, view_now(instance), variable->bank);
     if (values)
         return values + variable->index;
-    refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, variable->name,
+    refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, name_at(&model, variable->name),
            engine_problem(instance->engine));
     return NULL;
 }
@@ -92,8 +92,9 @@ static Answer read_variable(const Instance *instance, const ModelVariable *varia
         double value = variable->type == TYPE_INT32 ? floor(from[k] + 0.5) : from[k];
         if (!fits(variable, value))
             return refuse(instance, "%s: '%s' is %g at t = %.17g, which a value of type %s must not be. Remedy: check "
-                          "its expression, the parameters and the inputs.", instance->name, variable->name, from[k],
-                          instance->run->time, type_name(variable->type));
+                          "its expression, the parameters and the inputs.",
+                          instance->name, name_at(&model, variable->name), from[k], instance->run->time,
+                          type_name((Type)variable->type));
         if (store)
             store(values, at + k, value);
     }
@@ -118,10 +119,11 @@ static Answer check_value(const Instance *instance, const char *function, const 
 {
     if (!isfinite(value))
         return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, value,
-                      variable->name);
+                      name_at(&model, variable->name));
     if (variable->bank == BANK_SIZE && value != (double)variable->index)
-        return refuse(instance, "%s: %s: the length '%s' is %zu in this FMU and cannot become %.0f. Remedy: export the "
-                      "model with that length.", instance->name, function, variable->name, variable->index, value);
+        return refuse(instance, "%s: %s: the length '%s' is %lu in this FMU and cannot become %.0f. Remedy: export the "
+                      "model with that length.", instance->name, function, name_at(&model, variable->name),
+                      (unsigned long)variable->index, value);
     return ANSWER_OK;
 }
 

@@ -39,22 +39,21 @@ bool end_run(Engine *engine)
     return false;
 }
 
-static size_t append_values(char *text, size_t used, size_t size, size_t n, const char *const *names,
-                            const double *values)
+const char *state_name(const Model *m, size_t i)
 {
-    for (size_t i = 0; i < n && used + 1 < size; i++) {
-        int added = snprintf(text + used, size - used, "%s%s = %.10g", used ? ", " : "", names[i], values[i]);
-        used += added > 0 ? (size_t)added : 0;
-    }
-    return used;
+    return name_at(m, i < m->n_states ? m->state_names[i] : m->discrete_names[i - m->n_states]);
 }
 
 const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size)
 {
     const Model *m = engine->model;
+    size_t used = 0;
     text[0] = '\0';
-    size_t used = append_values(text, 0, size, m->n_states, m->state_names, x);
-    append_values(text, used, size, m->n_discrete, m->discrete_names, z);
+    for (size_t i = 0; i < m->n_states + m->n_discrete && used + 1 < size; i++) {
+        double value = i < m->n_states ? x[i] : z[i - m->n_states];
+        int added = snprintf(text + used, size - used, "%s%s = %.10g", used ? ", " : "", state_name(m, i), value);
+        used += added > 0 ? (size_t)added : 0;
+    }
     end_text_cleanly(text);
     return text;
 }
@@ -244,5 +243,6 @@ bool engine_block_is_sound(const Engine *engine, void *block)
                  status->relative_tolerance >= RELATIVE_TOLERANCE && status->absolute_tolerance > 0.0;
     for (size_t j = 0; j < engine->model->n_jumps; j++)
         sound = sound && other.history[j].stored <= N_ZENO_TIMES;
+    sound = sound && (!status->has_segment || status->segment_begin < status->segment_end);
     return sound && isfinite(*other.live.time) && !isnan(*other.predicted.time);
 }

@@ -33,7 +33,7 @@ Answer instance_set_states(void *handle, const char *function, const double x[],
     for (size_t i = 0; i < n; i++)
         if (!isfinite(x[i]))
             return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, x[i],
-                          model.state_names[i]);
+                          name_at(&model, model.state_names[i]));
     engine_set_states(instance->engine, x);
     return ANSWER_OK;
 }
@@ -41,8 +41,8 @@ Answer instance_set_states(void *handle, const char *function, const double x[],
 static const char *name_of(Bank bank, size_t i)
 {
     if (bank == BANK_INDICATOR)
-        return i < model.n_margins ? model.margin_names[i] : "flow set";
-    return model.state_names[i];
+        return i < model.n_margins ? name_at(&model, model.margin_names[i]) : "flow set";
+    return name_at(&model, model.state_names[i]);
 }
 
 Answer instance_get_vector(void *handle, const char *function, Bank bank, double values[], size_t n)

@@ -142,14 +142,14 @@ bool step_begin(Engine *engine, const Point *point)
             return problem(engine, ENDED_NOT_FINITE,
                            "The derivative of '%s' is %g at t = %.17g where '%s' = %.17g; derivatives must be finite. "
                            "Remedy: check the flow map and the parameters.",
-                           engine->model->state_names[i], step->k[0][i], t, engine->model->state_names[i],
+                           state_name(engine->model, i), step->k[0][i], t, state_name(engine->model, i),
                            point->x[i]);
     return true;
 }
 
 static bool step_too_small(Engine *engine, const Point *point, double h, bool finite)
 {
-    const char *name = engine->model->state_names[engine->suspect];
+    const char *name = state_name(engine->model, engine->suspect);
     double value = point->x[engine->suspect];
     if (!finite)
         return problem(engine, ENDED_NOT_FINITE,

@@ -25,7 +25,7 @@ bool accept_state(Engine *engine, const char *source, const Point *point)
 {
     const Model *m = engine->model;
     for (size_t i = 0; i < m->n_states + m->n_discrete; i++) {
-        const char *name = i < m->n_states ? m->state_names[i] : m->discrete_names[i - m->n_states];
+        const char *name = state_name(m, i);
         if (!isfinite(engine->reset.x[i]))
             return problem(engine, ENDED_NOT_FINITE,
                            "'%s' becomes %g at t = %.17g by %s; states must be finite. Remedy: check that map and the "
@@ -51,12 +51,12 @@ static bool evaluate_reset(Engine *engine, size_t jump, const Point *point)
 
 bool apply_reset(Engine *engine, size_t jump, const Point *point)
 {
-    const ModelJump *entry = &engine->model->jumps[jump];
+    const char *name = name_at(engine->model, engine->model->jumps[jump].name);
     char source[MESSAGE_SIZE / 4];
     if (!evaluate_reset(engine, jump, point))
-        return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.", entry->name,
+        return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.", name,
                        *point->time);
-    snprintf(source, sizeof source, "the jump map of '%s'", entry->name);
+    snprintf(source, sizeof source, "the jump map of '%s'", name);
     end_text_cleanly(source);
     return accept_state(engine, source, point);
 }
@@ -74,7 +74,7 @@ bool evaluate_times(Engine *engine, const Point *point)
             return problem(engine, ENDED_NOT_FINITE,
                            "The time of '%s' is not a number at t = %.17g; a time event needs a time (infinity: "
                            "never). Remedy: check its expression and the parameters.",
-                           m->jumps[j].name, *point->time);
+                           name_at(m, m->jumps[j].name), *point->time);
     return true;
 }
 
@@ -89,7 +89,7 @@ static bool stuck_in_time(Engine *engine, size_t jump, double t)
                    "Zeno: time events, the last of them '%s', were taken more than %zu times at t = %.17g s; the next "
                    "time must lie after the present one. Remedy: let the jump map move the time on past it, or start "
                    "with the next time to come.",
-                   engine->model->jumps[jump].name, time_jumps_allowed(engine), t);
+                   name_at(engine->model, engine->model->jumps[jump].name), time_jumps_allowed(engine), t);
 }
 
 /* The first breakpoint of the flow that is due, n_jumps if there is none. */
@@ -203,7 +203,8 @@ static bool take_jump(Engine *engine, size_t jump)
     engine->live.level[engine->model->n_margins] = 0.0;
     tick(engine, jump);
     if (engine->jump_hook)
-        engine->jump_hook(engine->jump_context, *engine->live.time, engine->model->jumps[jump].name);
+        engine->jump_hook(engine->jump_context, *engine->live.time,
+                          name_at(engine->model, engine->model->jumps[jump].name));
     return count_jump(engine, jump) || end_run(engine);
 }
 

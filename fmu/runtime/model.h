@@ -8,6 +8,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 /* Calling convention of the generated functions (CasADi): arg[i] is input i (NULL: zeros), res[i] output i
    (NULL: not wanted), iw and w are work arrays of n_iw integers and n_w doubles; 0 means success. */
@@ -22,11 +23,14 @@ typedef int (*ModelReset)(size_t jump, const double **arg, double **res, long lo
 
 typedef enum { JUMP_ON_STATE, JUMP_ON_TIME } JumpKind;
 
+/* Names are places in one text, and numbers are short: large models have tens of thousands of variables. */
+typedef uint32_t ModelName;
+
 typedef struct {
-    const char *name;
+    ModelName name;
     JumpKind kind;
-    size_t index;          /* of its margin among the jump margins, or of its time among the times */
-    bool internal;         /* a breakpoint of the flow: depends on t, z, p only, is invisible outside (JUMP_ON_TIME only) */
+    uint32_t index;         /* of its margin among the jump margins, or of its time among the times */
+    bool internal;         /* a breakpoint of the flow (on time only): depends on t, z, p alone, invisible outside */
 } ModelJump;
 
 /* SIZE is the length of arrays, COUNTDOWN the clock of the next event, OPTION a switch of the interface. */
@@ -37,11 +41,10 @@ typedef enum {
 typedef enum { TYPE_FLOAT64, TYPE_INT32, TYPE_UINT64, TYPE_BOOLEAN, TYPE_CLOCK } Type;
 
 typedef struct {
-    const char *name;
-    Type type;
-    Bank bank;
-    size_t index;          /* of its first element in its bank; for BANK_CLOCK the clock's index, for BANK_SIZE the length */
-    size_t size;           /* number of its elements */
+    ModelName name;
+    uint32_t index;        /* of its first element in its bank; of BANK_CLOCK the clock's, of BANK_SIZE the length */
+    uint32_t size;         /* number of its elements */
+    uint8_t type, bank;
     bool discrete;         /* variability discrete (inputs, outputs) */
     bool calculated;       /* its start value is computed by `start`, so it cannot be set */
 } ModelVariable;
@@ -73,8 +76,14 @@ typedef struct {
     const ModelJump *jumps;            /* in the fixed order in which simultaneous ones are taken */
     const size_t *clock_jump;          /* n_clocks: the jump with which each clock ticks */
     const ModelVariable *variables;    /* value reference = index in this table; 0 is the time */
-    const char *const *state_names, *const *discrete_names, *const *margin_names;
+    const ModelName *state_names, *discrete_names, *margin_names;
+    const char *names;                 /* one after the other, each with its end */
 } Model;
+
+static inline const char *name_at(const Model *m, ModelName name)
+{
+    return m->names + name;
+}
 
 extern const Model model;
 

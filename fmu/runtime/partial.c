@@ -32,12 +32,12 @@ static Answer check_direction(const Instance *instance, const char *function, co
         const ModelVariable *variable = &model.variables[reference];
         if (variable->type != TYPE_FLOAT64 || place_of(variable, known) == N_SEEDS)
             return refuse(instance, "%s: %s: '%s' is none of the %s that derivatives are of.", instance->name,
-                          function, variable->name, known ? "knowns" : "unknowns");
+                          function, name_at(&model, variable->name), known ? "knowns" : "unknowns");
         needed += variable->size;
     }
     if (direction->n_values != needed)
-        return refuse(instance, "%s: %s: %zu values were given room for, but the %zu variables have %zu.",
-                      instance->name, function, direction->n_values, direction->n, needed);
+        return refuse(instance, "%s: %s: %zu values for %zu elements of the %zu variables.", instance->name, function,
+                      direction->n_values, needed, direction->n);
     for (size_t i = 0; i < needed; i++)
         if (direction->seeds && !isfinite(direction->seeds[i]))
             return refuse(instance, "%s: %s: the seed %g must be finite.", instance->name, function,

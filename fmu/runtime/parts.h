@@ -128,6 +128,8 @@ bool problem(Engine *engine, Ending ending, const char *format, ...) LIKE_PRINTF
 bool end_run(Engine *engine);
 void copy_values(double *to, const double *from, size_t n);
 void copy_point(const Engine *engine, const Point *from, const Point *to);
+/* The name of continuous state i, or from n_states on that of a discrete one. */
+const char *state_name(const Model *m, size_t i);
 /* The values of a state for a message: "h = 0.1, v = -4.4". */
 const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size);
 

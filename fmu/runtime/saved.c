@@ -211,8 +211,8 @@ Answer instance_deserialize(void *handle, const char *function, const unsigned c
     }
     if (wrong) {
         free(saved);
-        return refuse(instance, "%s: %s: the %zu bytes are refused: %s. Remedy: give the bytes that this FMU serialised, "
-                      "all of them.", instance->name, function, size, wrong);
+        return refuse(instance, "%s: %s: the %zu bytes are refused: %s. Remedy: give all the bytes that this FMU "
+                      "serialised.", instance->name, function, size, wrong);
     }
     free(*state);
     *state = saved;
