@@ -31,6 +31,8 @@ static bool go_on(Engine *engine)
     double before = engine->target;
     engine->view = VIEW_NONE;
     engine->target = engine->hook(engine->hook_context, *engine->live.time, before);
+    /* What it has read is of this time; the run goes on. */
+    engine->view = VIEW_NONE;
     return *engine->live.step > 0.0 && engine->target >= before;
 }
 
