@@ -89,6 +89,12 @@ def only(kind, description):
     return re.sub(rf"<{other}[^>]*/>", "", description)
 
 
+# Co-simulation without capabilities: the fewest experiments, for faults on which each one takes its whole time.
+PLAIN = re.sub(
+    r'(canGetAndSetFMUState|canSerializeFMUState|hasEventMode)="true"', "", only("CoSimulation", DESCRIPTIONS[3])
+)
+
+
 @functools.cache
 def binary(major, *flags):
     """Compile the small FMU; flags are names of faults, or options of the compiler that start with a dash."""

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from catalogue import cases
-from small_fmus import DESCRIPTIONS, members, only, write
+from small_fmus import DESCRIPTIONS, PLAIN, members, only, write
 
 from cosim.cli.main import main
 from fmu.check.fmu_file import check_fmu
@@ -61,8 +61,8 @@ def test_strict_counts_warnings(tmp_path, capsys):
 
 
 def test_a_time_limit_is_obeyed(tmp_path, capsys):
-    path = write(tmp_path / "small.fmu", members(3, "HANG", description=only("CoSimulation", DESCRIPTIONS[3])))
-    status, printed = run(capsys, path, "--timeout", "1")
+    path = write(tmp_path / "small.fmu", members(3, "HANG", description=PLAIN))
+    status, printed = run(capsys, path, "--timeout", "4")
     assert status == 1
     assert "hangs in fmi3DoStep(0.0, nan)" in " ".join(printed.split())
 

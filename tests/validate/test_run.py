@@ -6,13 +6,14 @@ import sys
 import time
 
 import pytest
-from small_fmus import DESCRIPTIONS, SCHEDULED, members, only, write
+from small_fmus import DESCRIPTIONS, PLAIN, SCHEDULED, members, only, write
 
 from fmu.check.child_process import RunLimits
 from fmu.check.findings import Severity
 from fmu.check.fmu_file import check_fmu
 
-LIMITS = RunLimits(seconds=2.0, memory=512 << 20)
+# Generous for a machine under load: only what hangs takes all of it.
+LIMITS = RunLimits(seconds=30.0, memory=512 << 20)
 
 
 def check(tmp_path, major, *faults, description=None, limits=LIMITS):
@@ -95,8 +96,7 @@ def test_derivatives_that_are_promised_are_asked_for(fault, major, rule, tmp_pat
 
 def test_a_hang_on_nan_is_named_and_ends(tmp_path):
     began = time.monotonic()
-    text = only("CoSimulation", DESCRIPTIONS[3])
-    report = check(tmp_path, 3, "HANG", description=text, limits=RunLimits(seconds=1.0))
+    report = check(tmp_path, 3, "HANG", description=PLAIN, limits=RunLimits(seconds=4.0))
     [finding] = [finding for finding in report.findings if finding.rule == "run.hang"]
     assert "fmi3DoStep(0.0, nan)" in finding.message
     assert time.monotonic() - began < 60.0  # it would take for ever
@@ -104,15 +104,13 @@ def test_a_hang_on_nan_is_named_and_ends(tmp_path):
 
 def test_a_flood_of_output_is_limited(tmp_path):
     """The limit of file size holds on stdout: the disk is not filled while the time runs out."""
-    text = only("CoSimulation", DESCRIPTIONS[3])
-    report = check(tmp_path, 3, "FLOOD", description=text, limits=RunLimits(seconds=1.0, file_bytes=1 << 20))
+    report = check(tmp_path, 3, "FLOOD", description=PLAIN, limits=RunLimits(seconds=2.0, file_bytes=1 << 20))
     assert errors(report) == {"run.hang"}
     assert any("talkative" in finding.message for finding in report.findings)
 
 
 def test_memory_is_limited(tmp_path):
-    text = only("CoSimulation", DESCRIPTIONS[3])
-    report = check(tmp_path, 3, "MEMORY", description=text, limits=RunLimits(seconds=20.0, memory=192 << 20))
+    report = check(tmp_path, 3, "MEMORY", description=PLAIN, limits=RunLimits(seconds=20.0, memory=192 << 20))
     assert {"run.crash"} == errors(report)
     assert all("fmi3Instantiate" in f.message for f in report.findings)
 
@@ -174,8 +172,7 @@ def test_the_host_keeps_its_folder_and_leaves_no_file(tmp_path):
 
 def test_what_the_fmu_starts_ends_with_it(tmp_path):
     """A child of the child does not outlive the time limit."""
-    text = only("CoSimulation", DESCRIPTIONS[3])
-    report = check(tmp_path, 3, "FORK", description=text, limits=RunLimits(seconds=1.0))
+    report = check(tmp_path, 3, "FORK", description=PLAIN, limits=RunLimits(seconds=1.0))
     assert "run.hang" in errors(report)
     listed = subprocess.run(["ps", "-eo", "args"], capture_output=True, text=True, check=True).stdout
     assert "sleep 3141592" not in listed
