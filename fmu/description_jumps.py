@@ -10,19 +10,19 @@ from scipy import sparse
 
 from hybrid_model.variables import Kind
 
+_RESULTS = (Kind.STATE, Kind.DISCRETE)
+"""Vectors that jump maps give, x+ and z+."""
+
 
 def states_reset(traced: Any) -> frozenset[int]:
     """Return the elements of the continuous state vector that some jump may change.
 
     Parameters
     ----------
-    traced : Trace
-        With the jump maps ``resets``, if it has them apart; otherwise every state counts as changed by any jump.
+    traced : Trace or NetworkTrace
+        With its jump maps, or those of its groups of parts.
     """
-    resets = getattr(traced, "resets", None)
-    if resets is None:
-        return frozenset(range(traced.layout.sizes[Kind.STATE]) if traced.automaton.jumps else ())
-    return frozenset(element for reset in resets for element in _changed(reset, 0))
+    return frozenset[int]().union(*_changes(traced, Kind.STATE))
 
 
 def output_jumps(traced: Any, kind: Kind) -> list[frozenset[int] | None]:
@@ -30,7 +30,7 @@ def output_jumps(traced: Any, kind: Kind) -> list[frozenset[int] | None]:
 
     Parameters
     ----------
-    traced : Trace
+    traced : Trace or NetworkTrace
         As for `states_reset`.
     kind : {Kind.DISCRETE, Kind.OUTPUT}
         Which vector.
@@ -40,12 +40,11 @@ def output_jumps(traced: Any, kind: Kind) -> list[frozenset[int] | None]:
     list of frozenset of int or None
         Numbers of the jumps, one set an element; None where something else than a jump changes it as well.
     """
-    count = traced.layout.sizes[Kind.DISCRETE]
-    resets = getattr(traced, "resets", None)
-    if resets is None:
-        return [None] * traced.layout.sizes[kind]
-    changed = [_changed(reset, 1) for reset in resets]
-    by_state = [frozenset(k for k, elements in enumerate(changed) if z in elements) for z in range(count)]
+    jumps: list[set[int]] = [set() for _ in range(traced.layout.sizes[Kind.DISCRETE])]
+    for jump, elements in enumerate(_changes(traced, Kind.DISCRETE)):
+        for element in elements:
+            jumps[element].add(jump)
+    by_state = [frozenset(found) for found in jumps]
     if kind is Kind.DISCRETE:
         return list(by_state)
     other = np.zeros(traced.layout.sizes[Kind.OUTPUT], dtype=bool)
@@ -57,6 +56,20 @@ def output_jumps(traced: Any, kind: Kind) -> list[frozenset[int] | None]:
         None if free else frozenset[int]().union(*(by_state[z] for z in row))
         for row, free in zip(rows, other, strict=True)
     ]
+
+
+def _changes(traced: Any, kind: Kind) -> list[frozenset[int]]:
+    """Return the elements of x or z that each jump may change."""
+    resets = getattr(traced, "resets", None)
+    if resets is not None:
+        return [_changed(reset, _RESULTS.index(kind)) for reset in resets]
+    # A network: parts with equal maps share them.
+    by_group = [[_changed(reset, _RESULTS.index(kind)) for reset in group.traced.resets] for group in traced.groups]
+    found: list[frozenset[int]] = [frozenset()] * len(traced.automaton.jumps)
+    for member, group in zip(traced.members.members, traced.group_of, strict=True):
+        for k, elements in enumerate(by_group[group]):
+            found[member.jump + k] = frozenset(member.first[kind] + element for element in elements)
+    return found
 
 
 def _changed(reset: ca.Function, result: int) -> frozenset[int]:

@@ -1,11 +1,14 @@
 """Terminals: agents plug together by them, and other automata get theirs by the same rule."""
 
+from dataclasses import replace
+
 import pytest
 from catalogue import cases
 from description_cases import BOTH, described, elements, schema
 from lxml import etree
 
 import hybrid_model as hm
+from fmu.network import network_trace
 from fmu.terminals import KIND, terminals, terminals_and_icons
 from fmu.variables import Fmi
 from hybrid_model.models import BouncingBall
@@ -93,3 +96,13 @@ def test_the_file_is_valid_and_names_variables_that_exist(fmi):
             assert (terminal.get("terminalKind"), terminal.get("matchingRule")) == (KIND, "bus")
             own = [member.get("memberName") for member in terminal.findall("TerminalMemberVariable")]
             assert len(set(own)) == len(own) > 0
+
+
+@pytest.mark.parametrize("name", ["paper_dynamic", "firefly_network"])
+def test_a_network_of_tables_has_the_terminals_of_the_whole(name):
+    automaton = cases()[name].automaton
+    whole = described(automaton, Fmi.V3_0)
+    tables = replace(whole, traced=network_trace(automaton))
+    assert terminals(tables) == terminals(whole)
+    assert any("clock" in dict(terminal.members) for terminal in terminals(tables))
+    assert tables.states_reset == whole.states_reset
