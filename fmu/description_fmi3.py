@@ -18,7 +18,7 @@ from fmu.description_parts import (
     to_bytes,
 )
 from fmu.description_structure import Unknown
-from fmu.units import quantity
+from fmu.quantities import quantity
 from fmu.variables import Bank, FmiType
 
 TAGS = {

@@ -13,7 +13,8 @@ from typing import Any
 from fmu.description_jumps import states_reset
 from fmu.description_names import variable_names, xml_text
 from fmu.description_structure import Structure, model_structure
-from fmu.units import base_unit, display_attributes, quantity
+from fmu.quantities import display_attributes, quantity
+from fmu.units import base_unit
 from fmu.variables import Bank, FmiType, FmuVariable
 from hybrid_model import Automaton, Composition
 from hybrid_model.transitions import Trigger
