@@ -87,8 +87,10 @@ Answer instance_completed_step(void *handle, const char *function, bool *event, 
         return ANSWER_ERROR;
     if (!event || !terminate)
         return null_argument(instance, function);
-    *terminate = false;
-    /* An importer that does not watch the indicators still does not pass an event unseen. */
+    /* An importer that does not watch the indicators still does not pass an event unseen, nor leave the flow set. */
     *event = engine_pending(instance->engine) < model.n_jumps;
+    *terminate = !*event && !engine_may_flow(instance->engine);
+    if (*terminate)
+        refuse(instance, "%s: %s", instance->name, engine_message(instance->engine));
     return ANSWER_OK;
 }

@@ -155,6 +155,20 @@ bool engine_arrive(Engine *engine)
     return raise_levels_here(engine, &engine->live);
 }
 
+bool engine_may_flow(Engine *engine)
+{
+    const Point *live = &engine->live;
+    double margin, level;
+    if (engine->status->ending != ENDED_NOT)
+        return false;
+    if (!engine->model->has_flow_set)
+        return true;
+    if (!evaluate_flow_set(engine, *live->time, live->x, live->z, &margin))
+        return end_run(engine);
+    return margin >= -EVENT_TOLERANCE || (step_begin(engine, live) && flow_may_begin(engine, live, &level)) ||
+           end_run(engine);
+}
+
 /* Whether a breakpoint is due at the live point or comes up to `target`; the times must be there. */
 static bool breakpoint_until(const Engine *engine, double target)
 {

@@ -57,6 +57,10 @@ Answer instance_update(void *handle, const char *function, EventUpdate *update)
     /* This iteration's clocks are over; the next one's are those of the jump that comes next. */
     engine_clear_ticks(engine);
     bool settled = !update->terminate && !update->again;
+    if (settled && instance->interface == MODEL_EXCHANGE && !engine_may_flow(engine)) {
+        update->terminate = true;
+        settled = false;
+    }
     update->has_next = settled && next_event(instance, &update->next);
     if (!update->has_next)
         update->next = 0.0;
