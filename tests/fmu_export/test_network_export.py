@@ -1,0 +1,102 @@
+"""Networks as FMUs: the run, the size, and derivatives of a thousand agents in closed form."""
+
+import zipfile
+
+import fmpy
+import networkx as nx
+import numpy as np
+import pytest
+from fmpy.fmi3 import FMU3Slave
+
+import hybrid_model as hm
+from fmu.compiled import compiled
+from fmu.export import export_fmu
+from fmu.network import worth_looping
+from hybrid_model.consensus.network import closed_loop
+from hybrid_model.consensus.scenario import read_scenario
+
+
+def network(agents, weights="constant", seed=1):
+    """Agents on a random graph of degree 4, with weights of their own; the scenario."""
+    graph = nx.random_regular_graph(4, agents, seed=seed)
+    edges = [[a + 1, b + 1] for a, b in graph.edges]
+    rng = np.random.default_rng(seed)
+    numbers = rng.uniform(0.1, 1.5, len(edges)).tolist()
+    entries = {
+        "name": f"network_{agents}_{weights}",
+        "stop_time": 1.0,
+        "network": {"agents": agents, "edges": edges, "initial": rng.uniform(-1.0, 1.0, agents).tolist()},
+        "weights": {"kind": "constant", "value": numbers},
+        "trigger": {"kind": "dynamic", "threshold": 0.1, "decay": 0.1},
+    }
+    if weights == "gated":
+        duty = rng.uniform(20.0, 60.0, len(edges)).tolist()
+        entries["weights"] = {"kind": "gated-sine", "gate_rate": 4.0, "sine_rate": 5.0, "duty_percent": duty}
+        half = len(edges) // 2
+        rows = [list(range(1, half + 1)), list(range(half + 1, len(edges) + 1))]
+        entries["switching"] = {"dwell": 0.3, "active": rows}
+    return read_scenario(entries)
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize("weights", ["constant", "gated"])
+def test_a_network_runs_like_the_whole(exported, weights, fmi):
+    composition = closed_loop(network(14, weights))
+    assert worth_looping(composition)
+    end = 0.8
+    arc = hm.simulate(compiled(composition), end)
+    names = [f"agent{k}.{item}" for k in range(1, 15) for item in ("x", "broadcast", "events")]
+    path = exported(composition, fmi=fmi)
+    run = fmpy.simulate_fmu(
+        str(path), stop_time=end, output_interval=end / 4, output=names, fmi_type="CoSimulation", validate=False
+    )
+    expected = [float(arc.at(name, end)) for name in names]
+    assert sum(expected[2::3]) > 14
+    # The limit of the repository for states in different executions; counts of broadcasts are equal.
+    np.testing.assert_allclose([run[-1][name] for name in names], expected, rtol=0, atol=1e-8)
+    assert [run[-1][name] for name in names[2::3]] == expected[2::3]
+
+
+def binary_size(path):
+    with zipfile.ZipFile(path) as archive:
+        return max(item.file_size for item in archive.infolist() if item.filename.startswith("binaries/"))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_a_thousand_agents_in_less_than_two_megabytes(tmp_path, fmi):
+    path = export_fmu(closed_loop(network(1000)), tmp_path / "network.fmu", fmi=fmi)
+    assert binary_size(path) < 2_000_000
+
+
+@pytest.mark.long
+def test_rates_and_derivatives_of_a_thousand_agents(tmp_path):
+    """x' = -k L x at the start, where all values have just been broadcast; its derivative by k is -L x."""
+    scenario = network(1000)
+    path = export_fmu(closed_loop(scenario), tmp_path / "network.fmu")
+    description = fmpy.read_model_description(str(path))
+    reference = {variable.name: variable.valueReference for variable in description.modelVariables}
+    x = np.array(scenario.network.initial)
+    expected = np.zeros(1000)
+    for (a, b), waveform in zip(scenario.network.edges, scenario.weights.waveforms, strict=True):
+        flow = waveform.level * (x[b - 1] - x[a - 1])
+        expected[a - 1] += flow
+        expected[b - 1] -= flow
+    slave = FMU3Slave(
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(str(path), str(tmp_path / "network")),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
+    slave.instantiate(eventModeUsed=True)
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    rates = [reference[f"der(agent{k}.x)"] for k in range(1, 1001)]
+    # Sums of four products in another order.
+    np.testing.assert_allclose(slave.getFloat64(rates), expected, rtol=0, atol=1e-14)
+    gains = [reference[f"agent{k}.gain"] for k in range(1, 1001)]
+    forward = slave.getDirectionalDerivative(rates, gains, np.ones(1000), 1000)
+    np.testing.assert_allclose(forward, expected, rtol=0, atol=1e-14)
+    adjoint = slave.getAdjointDerivative(rates, gains, np.ones(1000), 1000)
+    np.testing.assert_allclose(adjoint, expected, rtol=0, atol=1e-14)
+    slave.terminate()
+    slave.freeInstance()
