@@ -7,7 +7,9 @@ end are the ways in which importers run an FMU.
 import ctypes as c
 import itertools
 import math
+import os
 import random
+import shutil
 from pathlib import Path
 from typing import NamedTuple
 
@@ -43,9 +45,7 @@ class Library:
 
     def __init__(self, path):
         self.description = fmpy.read_model_description(str(path))
-        self.folder = Path(path).with_suffix(".unzipped")
-        if not self.folder.exists():  # a binary that is loaded must not be written again
-            fmpy.extract(str(path), str(self.folder))
+        self.folder = unpacked(Path(path))
         self.token = self.description.instantiationToken.encode()
         self.variables = {variable.name: variable for variable in self.description.modelVariables}
         self.clocks = [n for n, v in self.variables.items() if v.type == "Clock" and v.causality == "output"]
@@ -61,6 +61,18 @@ class Library:
 
     def reference(self, name):
         return self.variables[name].valueReference
+
+
+def unpacked(path):
+    """The folder beside an FMU with its content; made once, whatever the number of test processes."""
+    folder, own = path.with_suffix(".unzipped"), path.with_suffix(f".{os.getpid()}")
+    if not folder.exists():  # a binary that is loaded must not be written again
+        fmpy.extract(str(path), str(own))
+        try:
+            own.rename(folder)
+        except OSError:  # another process was faster
+            shutil.rmtree(own)
+    return folder
 
 
 def elements(variable):

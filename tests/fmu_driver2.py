@@ -10,7 +10,7 @@ import math
 from typing import NamedTuple
 
 import fmpy
-from fmu_driver import elements
+from fmu_driver import elements, unpacked
 
 OK, DISCARD, ERROR = 0, 2, 3
 CATEGORIES = ("logStatusError", "logEvents")
@@ -98,10 +98,7 @@ class Binary:
         self.description = fmpy.read_model_description(str(path), validate=False)
         self.version = int(self.description.fmiVersion[0])
         self.token = (self.description.guid if self.version == 2 else self.description.instantiationToken).encode()
-        folder = path.with_suffix(".unzipped")
-        if not folder.exists():  # a binary that is loaded must not be written again
-            fmpy.extract(str(path), str(folder))
-        [library] = (folder / "binaries").rglob(f"*{fmpy.sharedLibraryExtension}")
+        [library] = (unpacked(path) / "binaries").rglob(f"*{fmpy.sharedLibraryExtension}")
         self.path = library
         self.functions = c.CDLL(str(library))
         for name in ("fmi2Instantiate", "fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"):
