@@ -217,3 +217,29 @@ def model_exchange(harness, witness, *, slot=0):
     instance.do("plain", "terminate")
     instance.free()
     return seen
+
+
+MODES = ("instantiated", "configuration", "initialization", "event", "step", "continuous", "terminated")
+
+
+def has_mode(mode, fmi, kind):
+    """Whether an instance, with event mode where it can be had, comes into a mode."""
+    missing = {"configuration": fmi == "2.0", "event": (fmi, kind) == ("2.0", "cs")}
+    missing |= {"step": kind == "me", "continuous": kind == "cs"}
+    return not missing.get(mode, False)
+
+
+def go_to_mode(instance, mode, fmi):
+    """From Instantiated to a mode that it has, by the shortest way."""
+    running = "continuous" if instance.kind == "me" else "step"
+    if mode == "configuration":
+        instance.do("plain", "configure")
+    if mode in ("initialization", "event", running, "terminated"):
+        instance.begin()
+    if mode in ("event", running, "terminated"):
+        instance.do("plain", "end")
+        in_event_mode = instance.kind == "me" or (fmi == "3.0" and instance.events)
+        if mode == running and in_event_mode:
+            instance.iterate(running)
+    if mode == "terminated":
+        instance.do("plain", "terminate")
