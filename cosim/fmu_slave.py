@@ -1,26 +1,43 @@
-"""An FMI 3.0 Co-Simulation FMU behind the slave interface, over fmpy."""
+"""A Co-Simulation FMU of FMI 2.0 or 3.0 behind the slave interface."""
 
 from __future__ import annotations
 
+import math
 import shutil
+import tempfile
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy import extract, read_model_description
+from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi3 import FMU3Slave
 
 from cosim.errors import CosimError
+from cosim.fmi2_instance import Fmi2Instance
+from cosim.fmi3_instance import Fmi3Instance
+from cosim.fmu_instance import FmuInstance
 from cosim.slave import Port, Slave, Step, Termination, Update
+from fmu.check.archive import Archive
+
+MAX_PARTS = 10_000
+"""Most early returns within one communication step of a master that handles no events."""
+
+_INTEGERS = {
+    "Integer",
+    "Boolean",
+    "Enumeration",
+    *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)),
+}
+_NUMBERS = {"Real", "Float32", "Float64", *_INTEGERS}
 
 
 class FmuSlave(Slave):
     """An FMU that a master steps.
 
-    Loading an FMU runs its native code in this process: load only FMUs that you trust.
+    An FMU of FMI 2.0 has no event mode; a step that it ends early is carried on to its end, so that the fixed-step
+    master drives it like any other. Loading an FMU runs its native code in this process: load only FMUs that you trust.
 
     Parameters
     ----------
@@ -32,39 +49,45 @@ class FmuSlave(Slave):
     Raises
     ------
     CosimError
-        If the file is not an FMI 3.0 Co-Simulation FMU with a binary for this machine.
+        If the file is not an FMI 2.0 or 3.0 Co-Simulation FMU, or its archive must not be extracted; from `load` or
+        `start`, if it has no binary for this machine.
     """
 
     def __init__(self, name: str, path: str | Path) -> None:
         try:
-            description = read_model_description(str(path))
+            with Archive(path):  # found safe to extract
+                description = read_model_description(str(path))
         except Exception as error:
             raise CosimError(f"{name}: {path} cannot be read as an FMU: {error}") from error
-        if not description.fmiVersion.startswith("3.") or description.coSimulation is None:
+        self._kind = _kind(description)
+        if self._kind is None or description.coSimulation is None:
             raise CosimError(
-                f"{name}: {path} is not an FMI 3.0 Co-Simulation FMU (it says FMI {description.fmiVersion}): "
-                "export it as one."
+                f"{name}: {path} is not an FMI 2.0 or 3.0 Co-Simulation FMU (it says FMI {description.fmiVersion}, "
+                f"{_interfaces(description)}): export it as one."
             )
         self._variables = {variable.name: variable for variable in description.modelVariables}
-        self._elements = {name: place for v in description.modelVariables for name, place in _elements(v)}
-        scalars = [v for v in description.modelVariables if v.type != "Clock"]
+        numbers = [variable for variable in description.modelVariables if variable.type in _NUMBERS]
+        self._elements = {name: place for variable in numbers for name, place in _elements(variable)}
+        self._clock_references = {
+            variable.name: variable.valueReference
+            for variable in description.modelVariables
+            if variable.type == "Clock" and variable.causality == "output"
+        }
         super().__init__(
             name,
-            [port for v in scalars if v.causality == "input" for port in _ports(v)],
-            [port for v in scalars if v.causality == "output" for port in _ports(v)],
-            [v.name for v in description.modelVariables if v.type == "Clock" and v.causality == "output"],
+            [port for variable in numbers if variable.causality == "input" for port in _ports(variable)],
+            [port for variable in numbers if variable.causality == "output" for port in _ports(variable)],
+            list(self._clock_references),
         )
-        self.has_event_mode = bool(description.coSimulation.hasEventMode)
+        self.has_event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
         self.can_restore = bool(description.coSimulation.canGetAndSetFMUstate)
         experiment = description.defaultExperiment
         self.default_stop_time = float(experiment.stopTime) if experiment and experiment.stopTime else None
-        self._clock_references = [self._variables[clock].valueReference for clock in self.clocks]
         self._messages: list[str] = []
-        self._token = description.instantiationToken
-        self._identifier = description.coSimulation.modelIdentifier
-        self._path = str(path)
-        self._library: FMU3Slave | None = None
-        self._fmu: FMU3Slave | None = None
+        self._description = description
+        self._path = path
+        self._loaded: FmuInstance | None = None
+        self._running: FmuInstance | None = None
         self._starts: dict[str, float] = {}
         self._getters: dict[str, tuple[Callable[..., list[Any]], tuple[Any, ...], int]] = {}
 
@@ -77,7 +100,9 @@ class FmuSlave(Slave):
         """See `Slave.set`."""
         if name not in self._elements:
             raise self.unknown(name)
-        if self._fmu is None:
+        if not math.isfinite(value):
+            raise CosimError(f"{self.name}.{name} is set to {value}: set a finite number.")
+        if self._running is None:
             self._starts[name] = value
         else:
             self._write(name, value)
@@ -88,113 +113,118 @@ class FmuSlave(Slave):
             if name not in self._elements:
                 raise self.unknown(name)
             whole, index = self._elements[name]
-            getter, arguments = self._getter(whole)
-            self._getters[name] = getter, arguments, index
+            variable = self._variables[whole]
+            self._getters[name] = *self._instance.getter(variable, _size(variable)), index
         getter, arguments, index = self._getters[name]
         return float(self._call(getter, *arguments)[index])
 
-    def load(self) -> FMU3Slave:
+    def load(self) -> FmuInstance:
         """Load the FMU's binary, once for all runs; `start` does it if nobody has."""
-        if self._library is None:
-            folder = extract(self._path)
-            self._library = FMU3Slave(
-                guid=self._token, unzipDirectory=folder, modelIdentifier=self._identifier, instanceName=self.name
-            )
-            weakref.finalize(self, _unload, self._library, folder)
-        return self._library
+        if self._loaded is None:
+            assert self._kind is not None
+            folder = tempfile.mkdtemp()
+            try:
+                with Archive(self._path) as archive:
+                    archive.extract(Path(folder))
+                self._loaded = self._kind(self._description, folder, self.name, self._messages.append)
+            except Exception as error:
+                shutil.rmtree(folder, ignore_errors=True)
+                raise CosimError(f"{self.name}: {self._path} cannot be loaded on this machine: {error}") from error
+            weakref.finalize(self, _unload, self._loaded.fmu, folder)
+        return self._loaded
 
     def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
         """See `Slave.start`."""
         if events and not self.has_event_mode:
             raise CosimError(f"{self.name} has no event mode: use the fixed-step master.")
         self._events = events
-        self._fmu = self.load()
+        loaded = self.load()
         try:
-            self._fmu.instantiate(eventModeUsed=events, earlyReturnAllowed=events, logMessage=self._log)
+            loaded.instantiate(events)
         except Exception as error:
-            self._fmu = None
             raise CosimError(f"{self.name} refuses to be instantiated: {self._said()}") from error
+        self._running = loaded
         for name, value in self._starts.items():
             self._write(name, value)
-        self._call(self._fmu.enterInitializationMode, startTime=t_start, stopTime=t_stop)
+        self._call(loaded.enter_initialization, t_start, t_stop)
 
     def begin(self) -> None:
         """See `Slave.begin`."""
-        self._call(self._instance.exitInitializationMode)
+        self._call(self._instance.exit_initialization)
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
-        self._call(self._instance.enterEventMode)
+        self._call(self._instance.enter_event_mode)
 
     def enter_step_mode(self) -> None:
         """See `Slave.enter_step_mode`."""
-        self._call(self._instance.enterStepMode)
+        self._call(self._instance.enter_step_mode)
 
     def update(self) -> Update:
         """See `Slave.update`."""
         ticks = self._ticks()
-        again, terminate, _, _, defined, time = self._call(self._instance.updateDiscreteStates)
-        return Update(again, ticks, time if defined else None, self._termination(terminate))
+        again, terminate, time = self._call(self._instance.update)
+        return Update(again, ticks, time, self._termination(terminate))
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Slave.step`."""
-        event, terminate, _, reached = self._call(self._instance.doStep, t, t_next - t)
-        return Step(reached, event, self._termination(terminate))
+        instance = self._instance
+        for _ in range(MAX_PARTS):
+            reached, event, terminate, early = self._call(instance.step, t, t_next)
+            if self._events or terminate or not early or reached >= t_next:
+                return Step(reached, event, self._termination(terminate))
+            if not reached > t:
+                raise CosimError(f"{self.name} returns from a step at {t:.17g} s and gets no further: {self._said()}")
+            t = reached
+        raise CosimError(f"{self.name} returned early from one step {MAX_PARTS} times, the last time at {t:.17g} s.")
 
     def save(self) -> Any:
         """See `Slave.save`."""
-        return self._call(self._instance.getFMUState)
+        return self._call(self._instance.save)
 
     def restore(self, state: Any) -> None:
         """See `Slave.restore`."""
-        self._call(self._instance.setFMUState, state)
+        self._call(self._instance.restore, state)
 
     def release(self, state: Any) -> None:
         """See `Slave.release`."""
-        self._call(self._instance.freeFMUState, state)
+        self._call(self._instance.release, state)
 
     def close(self) -> None:
         """See `Slave.close`."""
-        if self._fmu is not None:
-            self._fmu.fmi3FreeInstance(self._fmu.component)
-            self._fmu = None
+        if self._running is not None:
+            self._running.free()
+            self._running = None
         self._messages.clear()
 
     @property
-    def _instance(self) -> FMU3Slave:
-        if self._fmu is None:
+    def _instance(self) -> FmuInstance:
+        if self._running is None:
             raise CosimError(f"{self.name} has not been started: call start first.")
-        return self._fmu
+        return self._running
 
     def _ticks(self) -> tuple[str, ...]:
         if not self.clocks:
             return ()
-        active = self._call(self._instance.getClock, self._clock_references)
+        active = self._call(self._instance.ticks, list(self._clock_references.values()))
         return tuple(clock for clock, ticked in zip(self.clocks, active, strict=True) if ticked)
-
-    def _getter(self, whole: str) -> tuple[Callable[..., list[Any]], tuple[Any, ...]]:
-        variable = self._variables[whole]
-        return getattr(self._instance, f"get{variable.type}"), ([variable.valueReference], _size(variable))
 
     def _write(self, name: str, value: float) -> None:
         whole, index = self._elements[name]
         variable = self._variables[whole]
-        number = float(value) if variable.type.startswith("Float") else round(value)
+        number = round(value) if variable.type in _INTEGERS else float(value)
         values = [number]
-        if variable.dimensions:
-            getter, arguments = self._getter(whole)
+        if _size(variable) > 1:
+            getter, arguments = self._instance.getter(variable, _size(variable))
             values = list(self._call(getter, *arguments))
             values[index] = number
-        self._call(getattr(self._instance, f"set{variable.type}"), [variable.valueReference], values)
+        self._call(self._instance.set, variable, values)
 
-    def _call(self, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         try:
-            return function(*arguments, **named)
+            return function(*arguments)
         except FMICallException as error:
             raise CosimError(f"{self.name}: {error.function} failed: {self._said()}") from error
-
-    def _log(self, environment: Any, status: int, category: bytes | None, message: bytes) -> None:
-        self._messages.append(message.decode("utf-8", "replace"))
 
     def _termination(self, terminate: bool) -> Termination | None:
         # FMI has no reason for terminateSimulation; the FMUs that this project exports name it in their message.
@@ -204,8 +234,19 @@ class FmuSlave(Slave):
         return self._messages[-1] if self._messages else "the FMU logged no message"
 
 
-def _unload(library: FMU3Slave, folder: str) -> None:
-    library.freeLibrary()
+def _kind(description: Any) -> type[FmuInstance] | None:
+    if description.fmiVersion == "2.0":
+        return Fmi2Instance
+    return Fmi3Instance if description.fmiVersion.startswith("3.") else None
+
+
+def _interfaces(description: Any) -> str:
+    offered = {"Co-Simulation": description.coSimulation, "Model Exchange": description.modelExchange}
+    return " and ".join(name for name, interface in offered.items() if interface is not None) or "no interface"
+
+
+def _unload(fmu: Any, folder: str) -> None:
+    fmu.freeLibrary()
     shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -223,5 +264,6 @@ def _size(variable: Any) -> int:
 
 
 def _ports(variable: Any) -> list[Port]:
-    discrete = variable.variability == "discrete"
+    # FMI has no integer and no Boolean that changes along flows.
+    discrete = variable.variability == "discrete" or variable.type in _INTEGERS
     return [Port(name, variable.unit or "", discrete) for name, _ in _elements(variable)]

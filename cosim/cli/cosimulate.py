@@ -24,7 +24,11 @@ def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
     parser = commands.add_parser("cosim", help="co-simulate a scenario's agents, or run one FMU", allow_abbrev=False)
     parser.add_argument("system", metavar="SYSTEM", help="name of a preset, path of a TOML file, or an .fmu")
-    parser.add_argument("--master", choices=("event-exact", "fixed-step"), default="event-exact")
+    parser.add_argument(
+        "--master",
+        choices=("event-exact", "fixed-step"),
+        help="default: event-exact, or fixed-step for an .fmu without event mode, such as those of FMI 2.0",
+    )
     parser.add_argument("--stop-time", type=float, help="end of the run in s; an .fmu without a default needs it")
     parser.add_argument(
         "--step-size", type=float, default=0.01, help="communication step of the fixed-step master in s"
@@ -82,7 +86,8 @@ def _set_start(system: System, name: str, value: float) -> None:
 
 
 def _run(system: System, stop_time: float, options: argparse.Namespace) -> CosimResult:
-    if options.master == "fixed-step":
+    has_events = all(slave.has_event_mode for slave in system.slaves.values())
+    if (options.master or ("event-exact" if has_events else "fixed-step")) == "fixed-step":
         return run_fixed_step(system, stop_time, options.step_size, record=system.output_names)
     return run_event_exact(system, stop_time, output_interval=options.output_interval)
 
