@@ -1,7 +1,8 @@
-"""The heart of the project: one automaton in three executions, and all three agree.
+"""The heart of the project: one automaton in all its executions, and all of them agree.
 
-The Python run integrates with DOP853 over SciPy, the FMU with its own Dormand-Prince code in C, the co-simulation
-predicts event by event: what they share is the automaton and nothing of the numerics.
+The Python run integrates with DOP853 over SciPy, the FMU of Co-Simulation with its own Dormand-Prince code in C, the
+co-simulation predicts event by event; the FMU of Model Exchange leaves integration and location of events to an
+importer. What they share is the automaton and nothing of the numerics.
 """
 
 import importlib
@@ -11,6 +12,7 @@ import pkgutil
 import numpy as np
 import pytest
 from catalogue import cases
+from own_importer import exchange, step_through
 
 import hybrid_model as hm
 import hybrid_model.models
@@ -25,6 +27,24 @@ from hybrid_model.variables import Kind, element_names
 TIME_TOLERANCE = 1e-7
 STATE_TOLERANCE = 1e-8
 SAMPLES = 41
+
+# The FMUs of FMI 2.0 are made for this test alone: a model of each kind in the quick run, all in the long one.
+QUICK = {
+    "agent2_dynamic",
+    "ball_on_moving_table",
+    "boost_converter",
+    "bouncing_ball",
+    "finite_state_machine",
+    "gated_sine",
+    "newtons_cradle",
+    "sampled_lti_loop",
+    "thermostat",
+}
+
+
+def fmi2_cases():
+    """The catalogue, most of it for the long run."""
+    return [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in cases()]
 
 
 class StepSource(hm.HybridAutomaton):
@@ -126,6 +146,64 @@ def test_fmu_cosimulation_agrees_with_python_run(name, references, exported):
     case = cases()[name]
     slave = FmuSlave("block", exported(case.automaton, name))
     compare(case, references(name, case), cosimulate(case, slave))
+
+
+# What importers of FMI 2.0 and of Model Exchange do: there are no clocks, so the log tells the jumps.
+
+
+def points(case):
+    """The output times."""
+    return [*(k * (case.t_end / (SAMPLES - 1)) for k in range(SAMPLES - 1)), case.t_end]
+
+
+def shown(automaton):
+    """The scalars that an FMU shows of states, discrete states and outputs."""
+    kinds = (Kind.STATE, Kind.DISCRETE, Kind.OUTPUT)
+    kept = [variable for kind in kinds for variable in automaton.of_kind(kind) if not variable.internal]
+    return [name for variable in kept for name in element_names(variable)]
+
+
+def compare_run(case, arc, run, *, without=()):
+    """Same jumps in the same order, at the same times; same states and outputs at all output times but `without`."""
+    visible = [jump for jump in arc.jumps if not case.automaton.jumps[jump.index].internal]
+    assert [name for _, name in run.jumps] == [jump.name for jump in visible]
+    np.testing.assert_allclose([t for t, _ in run.jumps], [jump.t for jump in visible], rtol=0, atol=TIME_TOLERANCE)
+    assert run.times == points(case)
+    assert list(run.values) == shown(case.automaton)
+    kept = [k for k, t in enumerate(run.times) if t not in without]
+    for name, found in run.values.items():
+        base, _, index = name.partition("[")
+        values = arc.at(base, np.minimum([run.times[k] for k in kept], arc.t[-1]))
+        if index:
+            values = values[(slice(None), *(int(i) - 1 for i in index.rstrip("]").split(",")))]
+        np.testing.assert_allclose(np.array(found)[kept], values, rtol=0, atol=STATE_TOLERANCE, err_msg=name)
+
+
+@pytest.mark.parametrize("name", list(cases()))
+def test_model_exchange_agrees_with_python_run(name, references, exported):
+    model_exchange(name, "3.0", references, exported)
+
+
+@pytest.mark.parametrize("name", fmi2_cases())
+def test_fmi2_model_exchange_agrees_with_python_run(name, references, exported):
+    model_exchange(name, "2.0", references, exported)
+
+
+def model_exchange(name, fmi, references, exported):
+    case = cases()[name]
+    path = exported(case.automaton, name, fmi)
+    run = exchange(path, case.t_end, points(case), steps=case.steps, names=shown(case.automaton))
+    compare_run(case, references(name, case), run)
+
+
+@pytest.mark.parametrize("name", fmi2_cases())
+def test_fmi2_cosimulation_agrees_with_python_run(name, references, exported):
+    """Inputs change at communication points, and what they bring about is seen after the next step."""
+    case = cases()[name]
+    path = exported(case.automaton, name, "2.0")
+    run = step_through(path, case.t_end, points(case), steps=case.steps, names=shown(case.automaton))
+    changed = {t for steps in case.steps.values() for t, _ in steps}
+    compare_run(case, references(name, case), run, without=changed)
 
 
 def test_catalogue_is_complete():
