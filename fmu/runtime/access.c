@@ -23,6 +23,23 @@ static bool may_be_set(const ModelVariable *variable, int mode)
     }
 }
 
+const ModelVariable *find_variable(const Instance *instance, const char *function, Reference reference)
+{
+    if (reference < model.n_variables)
+        return &model.variables[reference];
+    refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name, function,
+           (unsigned long)reference);
+    return NULL;
+}
+
+Answer check_type(const Instance *instance, const char *function, const ModelVariable *variable, Type type)
+{
+    if (variable->type == type)
+        return ANSWER_OK;
+    return refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.", instance->name,
+                  function, name_at(&model, variable->name), type_name((Type)variable->type));
+}
+
 /* Checks the arguments of a getter or setter before anything is written. */
 static Answer check_access(const Instance *instance, const char *function, Type type, bool set,
                            const Reference references[], size_t n, const void *values, size_t n_values)
@@ -31,13 +48,9 @@ static Answer check_access(const Instance *instance, const char *function, Type 
     if (n > 0 && (!references || !values))
         return null_argument(instance, function);
     for (size_t i = 0; i < n; i++) {
-        if (references[i] >= model.n_variables)
-            return refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name,
-                          function, (unsigned long)references[i]);
-        const ModelVariable *variable = &model.variables[references[i]];
-        if (variable->type != type)
-            return refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.",
-                          instance->name, function, name_at(&model, variable->name), type_name((Type)variable->type));
+        const ModelVariable *variable = find_variable(instance, function, references[i]);
+        if (!variable || check_type(instance, function, variable, type) != ANSWER_OK)
+            return ANSWER_ERROR;
         if (set && !may_be_set(variable, instance->run->mode))
             return refuse(instance, "%s: %s: '%s' cannot be set in the state '%s'.", instance->name, function,
                           name_at(&model, variable->name), mode_name(instance->run->mode));

@@ -8,10 +8,11 @@ static Answer check_clocks(const Instance *instance, const char *function, const
 {
     if (n > 0 && (!references || !values))
         return null_argument(instance, function);
-    for (size_t i = 0; i < n; i++)
-        if (references[i] >= model.n_variables || model.variables[references[i]].type != TYPE_CLOCK)
-            return refuse(instance, "%s: %s: there is no clock with the value reference %lu.", instance->name,
-                          function, (unsigned long)references[i]);
+    for (size_t i = 0; i < n; i++) {
+        const ModelVariable *variable = find_variable(instance, function, references[i]);
+        if (!variable || check_type(instance, function, variable, TYPE_CLOCK) != ANSWER_OK)
+            return ANSWER_ERROR;
+    }
     return ANSWER_OK;
 }
 

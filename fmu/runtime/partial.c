@@ -25,11 +25,9 @@ static Answer check_direction(const Instance *instance, const char *function, co
     if (direction->n > 0 && (!direction->references || !values))
         return null_argument(instance, function);
     for (size_t i = 0; i < direction->n; i++) {
-        Reference reference = direction->references[i];
-        if (reference >= model.n_variables)
-            return refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name,
-                          function, (unsigned long)reference);
-        const ModelVariable *variable = &model.variables[reference];
+        const ModelVariable *variable = find_variable(instance, function, direction->references[i]);
+        if (!variable)
+            return ANSWER_ERROR;
         if (variable->type != TYPE_FLOAT64 || place_of(variable, known) == N_SEEDS)
             return refuse(instance, "%s: %s: '%s' is none of the %s that derivatives are of.", instance->name,
                           function, name_at(&model, variable->name), known ? "knowns" : "unknowns");
