@@ -25,6 +25,7 @@ faults: $(READY)
 benchmark: $(READY)
 	PIP_CONSTRAINT=constraints.txt $(BIN)/pip install --quiet --disable-pip-version-check -e ".[benchmark]"
 	PYTHONPATH=tests $(BIN)/python -m benchmarks
+	PYTHONPATH=tests $(BIN)/python -m benchmarks.step_cost
 
 lint: $(READY)
 	$(BIN)/ruff format --check .

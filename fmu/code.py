@@ -66,8 +66,10 @@ def _maps(traced: Trace | NetworkTrace) -> tuple[str, Sequence[int]]:
     return code, [max(getattr(f, size)() for f in functions) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
 
 
-_MAPS = ("start", "flow", "flow_set", "margins", "times", "outputs", "reset")
-_MAPS += ("forward", "reverse", "start_forward", "start_reverse")
+_MAPS = (
+    *("start", "flow", "flow_set", "margins", "times", "outputs", "reset"),
+    *("forward", "reverse", "start_forward", "start_reverse"),
+)
 _LONGEST_LITERAL = 60_000
 """Some compilers take no longer strings."""
 _RESET = """\

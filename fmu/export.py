@@ -74,9 +74,11 @@ def export_fmu(
     runtime = runtime_sources(version.value)
 
     # The token ties description and code together: it changes when either does.
-    unsigned = [model_description(traced, variables, "", fmi=version, kinds=chosen).decode()]
-    unsigned += [model_code(traced, variables, "", chosen), *map(Path.read_text, [*runtime, *_headers()])]
-    token = hashlib.sha256("".join(unsigned).encode()).hexdigest()[:32]
+    described = model_description(
+        traced, variables, "", fmi=version, kinds=chosen, stop_time=stop_time, step_size=step_size
+    )
+    written = [model_code(traced, variables, "", chosen).encode(), *map(Path.read_bytes, [*runtime, *_headers()])]
+    token = hashlib.sha256(b"".join([described, *written])).hexdigest()[:32]
     code = model_code(traced, variables, token, chosen)
     members = archive_content(
         traced,

@@ -16,7 +16,8 @@ from cosim.cli.exits import exit_of, progress
 from cosim.consensus import fmu_system, in_process_system, network_report
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult
-from fmu.export import Fmi, export_fmu
+from fmu.export import export_fmu
+from fmu.variables import Fmi
 from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound, convergence_bound
 from hybrid_model.consensus.certify import Certificates, certify
 from hybrid_model.consensus.figures import save_paper_figures

@@ -139,7 +139,10 @@ class Harness:
         self.calls = []
 
     def ask(self, *words):
-        line = " ".join(digits(word) if isinstance(word, float) else str(int(word) if isinstance(word, bool) else word) for word in words)
+        line = " ".join(
+            digits(word) if isinstance(word, float) else str(int(word) if isinstance(word, bool) else word)
+            for word in words
+        )
         self.calls.append(line)
         try:
             self.process.stdin.write(line.encode() + b"\n")
@@ -221,9 +224,7 @@ class Instance:
     ):
         self.harness, self.slot, self.kind, self.events = harness, slot, kind, events
         text = "-" if name is None else name.encode().hex() or "."
-        self.status = int(
-            harness.ask("new", slot, kind, events, early, logging, listening, update, text, token)[0]
-        )
+        self.status = int(harness.ask("new", slot, kind, events, early, logging, listening, update, text, token)[0])
 
     def call(self, name, *words):
         status, *rest = self.harness.ask(name, self.slot, *words)
