@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 
 from fmu.derivatives import derivative_functions
+from fmu.names import NameTable
 from fmu.network import NetworkTrace
 from fmu.trace import Trace
 from fmu.variables import FmuVariable
@@ -70,8 +71,6 @@ _MAPS = (
     *("start", "flow", "flow_set", "margins", "times", "outputs", "reset"),
     *("forward", "reverse", "start_forward", "start_reverse"),
 )
-_LONGEST_LITERAL = 60_000
-"""Some compilers take no longer strings."""
 _RESET = """\
 static int hybrid_reset(size_t jump, const double **arg, double **res, long long *iw, double *w)
 {
@@ -94,63 +93,39 @@ def _number(value: float) -> str:
 
 def _array(kind: str, name: str, items: Iterable[str]) -> str:
     # C has no empty arrays: a table without entries gets one that is never read.
-    entries = list(items) or ["{0}" if kind in ("ModelJump ", "ModelVariable ") else "0"]
+    entries = list(items) or ["{0}" if kind in ("ModelJump ", "ModelVariable ", "ModelName ") else "0"]
     return f"static const {kind}{name}[] = {{\n    " + ",\n    ".join(entries) + "\n};\n"
 
 
-class _Names:
-    """The names of a model in one text: the tables hold places in it."""
-
-    def __init__(self) -> None:
-        self._places: dict[str, int] = {}
-        self._size = 0
-
-    def place(self, name: str) -> str:
-        """Return where a name begins."""
-        if name not in self._places:
-            self._places[name] = self._size
-            self._size += len(name.encode()) + 1
-        return str(self._places[name])
-
-    def table(self) -> str:
-        """Return the definition of the text, which must come after all names are placed."""
-        if self._size <= _LONGEST_LITERAL:
-            lines = [f'{string(name)[:-1]}\\0"' for name in self._places]
-            return "static const char names[] =\n    " + "\n    ".join(lines or ['""']) + ";\n"
-        octets = b"".join(name.encode() + b"\0" for name in self._places)
-        rows = (",".join(map(str, octets[k : k + 32])) for k in range(0, len(octets), 32))
-        return _array("char ", "names", rows)
-
-
 def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> list[str]:
-    automaton, layout, names = traced.automaton, traced.layout, _Names()
+    automaton, layout, names = traced.automaton, traced.layout, NameTable()
     starts = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
     margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
     tables = [
         *(_array("double ", f"start_{name}", map(_number, layout.start(kind))) for name, kind in starts),
-        _array("ModelName ", "state_names", map(names.place, layout.names(Kind.STATE))),
-        _array("ModelName ", "discrete_names", map(names.place, layout.names(Kind.DISCRETE))),
-        _array("ModelName ", "margin_names", map(names.place, margin_names)),
+        _array("ModelName ", "state_names", map(names.entry, layout.names(Kind.STATE))),
+        _array("ModelName ", "discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
+        _array("ModelName ", "margin_names", map(names.entry, margin_names)),
         _array("ModelJump ", "jumps", _jumps(traced, names)),
         _array("size_t ", "clock_jump", (str(clock.jump) for clock in automaton.clocks)),
         _array("ModelVariable ", "variables", (_variable(variable, names) for variable in variables)),
     ]
-    return [*tables, names.table()]
+    return [*tables, names.definition("names")]
 
 
-def _jumps(traced: Trace | NetworkTrace, names: _Names) -> list[str]:
+def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
     rows = []
     counts = {Trigger.STATE: 0, Trigger.TIME: 0}
     for info in traced.automaton.jumps:
         kind = "JUMP_ON_STATE" if info.trigger is Trigger.STATE else "JUMP_ON_TIME"
-        rows.append(f"{{{names.place(info.name)}, {kind}, {counts[info.trigger]}, {_bool(info.internal)}}}")
+        rows.append(f"{{{names.entry(info.name)}, {kind}, {counts[info.trigger]}, {_bool(info.internal)}}}")
         counts[info.trigger] += 1
     return rows
 
 
-def _variable(variable: FmuVariable, names: _Names) -> str:
+def _variable(variable: FmuVariable, names: NameTable) -> str:
     flags = f"{_bool(variable.discrete)}, {_bool(variable.calculated)}"
-    place = f"{names.place(variable.name)}, {variable.index}, {variable.size}"
+    place = f"{names.entry(variable.name)}, {variable.index}, {variable.size}"
     return f"{{{place}, {variable.type.value}, {variable.bank.value}, {flags}}}"
 
 

@@ -10,15 +10,18 @@ from pathlib import Path
 from fmu.archive import archive_content
 from fmu.build import RUNTIME, binaries, fmi_headers, package, runtime_sources
 from fmu.code import model_code
-from fmu.description import model_description, model_identifier
+from fmu.description import model_identifier
 from fmu.errors import ExportError
-from fmu.network import trace_any
+from fmu.network import NetworkTrace, trace_any
 from fmu.package import check_target
 from fmu.variables import Fmi, fmu_variables
 from hybrid_model import Automaton
 
 KINDS = ("cs", "me")
 """Co-Simulation and Model Exchange."""
+
+_TOKEN = "place-of-the-instantiation-token"
+"""Stands for the token until what it is a digest of has been written; of the same length."""
 
 
 def export_fmu(
@@ -48,7 +51,8 @@ def export_fmu(
     platforms : sequence of str, optional
         Platforms that it is to run on, named as in FMI 3.0, such as ``x86_64-linux``; this machine's if not given.
     stop_time, step_size : float, optional
-        Default stop time and communication step in s that the description proposes.
+        Default stop time and communication step in s that the description proposes. With a stop time the archive holds
+        the results of a run in Python up to it, except for large networks (`fmu.network.worth_looping`).
     sources : bool
         Whether the archive holds the C sources as well.
     progress : callable, optional
@@ -73,27 +77,27 @@ def export_fmu(
     variables = fmu_variables(traced, version)
     runtime = runtime_sources(version.value)
 
-    # The token ties description and code together: it changes when either does.
-    described = model_description(
-        traced, variables, "", fmi=version, kinds=chosen, stop_time=stop_time, step_size=step_size
-    )
-    written = [model_code(traced, variables, "", chosen).encode(), *map(Path.read_bytes, [*runtime, *_headers()])]
-    token = hashlib.sha256(b"".join([described, *written])).hexdigest()[:32]
-    code = model_code(traced, variables, token, chosen)
-    members = archive_content(
+    code = model_code(traced, variables, _TOKEN, chosen)
+    content = archive_content(
         traced,
         variables,
-        token,
+        _TOKEN,
         code,
         fmi=version,
         kinds=chosen,
         stop_time=stop_time,
         step_size=step_size,
         sources=sources,
+        # A run of a large network in Python takes longer than all else together.
+        references=not isinstance(traced, NetworkTrace),
     )
+    # The token ties description and code together: it changes when either does.
+    written = [content["modelDescription.xml"], code.encode(), *map(Path.read_bytes, [*runtime, *_headers()])]
+    token = hashlib.sha256(b"".join(written)).hexdigest()[: len(_TOKEN)]
+    members = {name: item.replace(_TOKEN.encode(), token.encode()) for name, item in content.items()}
     with tempfile.TemporaryDirectory() as folder:
         generated = Path(folder) / "model.c"
-        generated.write_text(code, encoding="ascii")
+        generated.write_text(code.replace(_TOKEN, token), encoding="ascii")
         identifier = model_identifier(automaton.name)
         members |= binaries(
             [generated, *runtime],

@@ -37,7 +37,7 @@ Answer check_type(const Instance *instance, const char *function, const ModelVar
     if (variable->type == type)
         return ANSWER_OK;
     return refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.", instance->name,
-                  function, name_at(&model, variable->name), type_name((Type)variable->type));
+                  function, NAME_AT(&model, variable->name), type_name((Type)variable->type));
 }
 
 /* Checks the arguments of a getter or setter before anything is written. */
@@ -53,7 +53,7 @@ static Answer check_access(const Instance *instance, const char *function, Type 
             return ANSWER_ERROR;
         if (set && !may_be_set(variable, instance->run->mode))
             return refuse(instance, "%s: %s: '%s' cannot be set in the state '%s'.", instance->name, function,
-                          name_at(&model, variable->name), mode_name(instance->run->mode));
+                          NAME_AT(&model, variable->name), mode_name(instance->run->mode));
         needed += variable->size;
     }
     if (n_values != needed)
@@ -83,7 +83,7 @@ static const double *elements(const Instance *instance, const ModelVariable *var
     const double *values = engine_values(instance->engine, view_now(instance), variable->bank);
     if (values)
         return values + variable->index;
-    refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, name_at(&model, variable->name),
+    refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, NAME_AT(&model, variable->name),
            engine_problem(instance->engine));
     return NULL;
 }
@@ -106,7 +106,7 @@ static Answer read_variable(const Instance *instance, const ModelVariable *varia
         if (!fits(variable, value))
             return refuse(instance, "%s: '%s' is %g at t = %.17g, which a value of type %s must not be. Remedy: check "
                           "its expression, the parameters and the inputs.",
-                          instance->name, name_at(&model, variable->name), from[k], instance->run->time,
+                          instance->name, NAME_AT(&model, variable->name), from[k], instance->run->time,
                           type_name((Type)variable->type));
         if (store)
             store(values, at + k, value);
@@ -132,10 +132,10 @@ static Answer check_value(const Instance *instance, const char *function, const 
 {
     if (!isfinite(value))
         return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, value,
-                      name_at(&model, variable->name));
+                      NAME_AT(&model, variable->name));
     if (variable->bank == BANK_SIZE && value != (double)variable->index)
         return refuse(instance, "%s: %s: the length '%s' is %lu in this FMU and cannot become %.0f. Remedy: export the "
-                      "model with that length.", instance->name, function, name_at(&model, variable->name),
+                      "model with that length.", instance->name, function, NAME_AT(&model, variable->name),
                       (unsigned long)variable->index, value);
     return ANSWER_OK;
 }

@@ -39,9 +39,16 @@ bool end_run(Engine *engine)
     return false;
 }
 
-const char *state_name(const Model *m, size_t i)
+const char *write_name(const Model *m, ModelName name, char text[NAME_SIZE])
 {
-    return name_at(m, i < m->n_states ? m->state_names[i] : m->discrete_names[i - m->n_states]);
+    snprintf(text, NAME_SIZE, "%s%s", m->names + name.head, m->names + name.tail);
+    end_text_cleanly(text);
+    return text;
+}
+
+ModelName state_name(const Model *m, size_t i)
+{
+    return i < m->n_states ? m->state_names[i] : m->discrete_names[i - m->n_states];
 }
 
 const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size)
@@ -51,7 +58,8 @@ const char *describe_state(const Engine *engine, const double *x, const double *
     text[0] = '\0';
     for (size_t i = 0; i < m->n_states + m->n_discrete && used + 1 < size; i++) {
         double value = i < m->n_states ? x[i] : z[i - m->n_states];
-        int added = snprintf(text + used, size - used, "%s%s = %.10g", used ? ", " : "", state_name(m, i), value);
+        int added = snprintf(text + used, size - used, "%s%s = %.10g", used ? ", " : "",
+                             NAME_AT(m, state_name(m, i)), value);
         used += added > 0 ? (size_t)added : 0;
     }
     end_text_cleanly(text);

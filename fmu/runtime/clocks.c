@@ -24,7 +24,7 @@ static Answer check_countdowns(const Instance *instance, const char *function, c
     for (size_t i = 0; i < n; i++)
         if (model.variables[references[i]].bank != BANK_COUNTDOWN)
             return refuse(instance, "%s: %s: '%s' is an output clock, which ticks by itself.", instance->name,
-                          function, name_at(&model, model.variables[references[i]].name));
+                          function, NAME_AT(&model, model.variables[references[i]].name));
     return ANSWER_OK;
 }
 

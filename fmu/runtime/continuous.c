@@ -33,16 +33,9 @@ Answer instance_set_states(void *handle, const char *function, const double x[],
     for (size_t i = 0; i < n; i++)
         if (!isfinite(x[i]))
             return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, x[i],
-                          name_at(&model, model.state_names[i]));
+                          NAME_AT(&model, model.state_names[i]));
     engine_set_states(instance->engine, x);
     return ANSWER_OK;
-}
-
-static const char *name_of(Bank bank, size_t i)
-{
-    if (bank == BANK_INDICATOR)
-        return i < model.n_margins ? name_at(&model, model.margin_names[i]) : "flow set";
-    return name_at(&model, model.state_names[i]);
 }
 
 Answer instance_get_vector(void *handle, const char *function, Bank bank, double values[], size_t n)
@@ -59,9 +52,13 @@ Answer instance_get_vector(void *handle, const char *function, Bank bank, double
         return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
     for (size_t i = 0; i < n; i++)
         if (!isfinite(from[i])) {
+            bool margin = bank == BANK_INDICATOR;
+            const char *name = margin && i == model.n_margins ? "flow set"
+                                                              : NAME_AT(&model, margin ? model.margin_names[i]
+                                                                                       : model.state_names[i]);
             refuse(instance, "%s: %s: the value for '%s' is %g at t = %.17g, which is not finite. Remedy: a smaller "
                    "step, or other parameters and inputs.",
-                   instance->name, function, name_of(bank, i), from[i], instance->run->time);
+                   instance->name, function, name, from[i], instance->run->time);
             /* The importer may try a smaller step. */
             return ANSWER_DISCARD;
         }

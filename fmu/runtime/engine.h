@@ -38,7 +38,7 @@ typedef enum {
 } Advance;
 
 /* Called with each visible jump that is taken. */
-typedef void (*JumpHook)(void *context, double time, const char *name);
+typedef void (*JumpHook)(void *context, double time, size_t jump);
 /* Called during engine_advance after each step of the solver on the way, with the live state there and the target.
    It may set inputs, and returns the target from now on: what it was given, or a nearer one. */
 typedef double (*StepHook)(void *context, double time, double target);

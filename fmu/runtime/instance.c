@@ -67,13 +67,14 @@ Answer null_argument(const Instance *instance, const char *function)
                   instance->name, function);
 }
 
-static void log_jump(void *context, double time, const char *name)
+static void log_jump(void *context, double time, size_t jump)
 {
     const Instance *instance = context;
     char message[512];
     if (!instance->log_line || !instance->logging || !(instance->categories & LOG_EVENTS))
         return;
-    snprintf(message, sizeof message, "%s: '%s' jumps at t = %.17g.", instance->name, name, time);
+    snprintf(message, sizeof message, "%s: '%s' jumps at t = %.17g.", instance->name,
+             NAME_AT(&model, model.jumps[jump].name), time);
     end_text_cleanly(message);
     instance->log_line(instance, ANSWER_OK, EVENT_CATEGORY, message);
 }

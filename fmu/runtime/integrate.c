@@ -130,6 +130,7 @@ static bool starting_step(Engine *engine, const Point *point, double *h)
 
 bool step_begin(Engine *engine, const Point *point)
 {
+    const Model *m = engine->model;
     Step *step = &engine->step;
     double t = *point->time;
     step->t0 = step->t1 = t;
@@ -137,19 +138,19 @@ bool step_begin(Engine *engine, const Point *point)
     step->has_dense = false;
     if (!derivative(engine, t, point->x, point->z, step->k[0]))
         return false;
-    for (size_t i = 0; i < engine->model->n_states; i++)
+    for (size_t i = 0; i < m->n_states; i++)
         if (!isfinite(step->k[0][i]))
             return problem(engine, ENDED_NOT_FINITE,
                            "The derivative of '%s' is %g at t = %.17g where '%s' = %.17g; derivatives must be finite. "
                            "Remedy: check the flow map and the parameters.",
-                           state_name(engine->model, i), step->k[0][i], t, state_name(engine->model, i),
+                           NAME_AT(m, m->state_names[i]), step->k[0][i], t, NAME_AT(m, m->state_names[i]),
                            point->x[i]);
     return true;
 }
 
 static bool step_too_small(Engine *engine, const Point *point, double h, bool finite)
 {
-    const char *name = state_name(engine->model, engine->suspect);
+    const char *name = NAME_AT(engine->model, engine->model->state_names[engine->suspect]);
     double value = point->x[engine->suspect];
     if (!finite)
         return problem(engine, ENDED_NOT_FINITE,

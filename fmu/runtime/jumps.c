@@ -20,18 +20,24 @@ size_t engine_jumps_taken(const Engine *engine)
     return (size_t)engine->status->jumps_taken;
 }
 
-/* Copies the new state into the point if all of it is finite. */
-bool accept_state(Engine *engine, const char *source, const Point *point)
+/* Says which state the jump (n_jumps: the start map) has made a number that it must not be. */
+static bool not_finite(Engine *engine, size_t jump, size_t i, double t)
 {
     const Model *m = engine->model;
-    for (size_t i = 0; i < m->n_states + m->n_discrete; i++) {
-        const char *name = state_name(m, i);
+    bool starts = jump == m->n_jumps;
+    return problem(engine, ENDED_NOT_FINITE,
+                   "'%s' becomes %g at t = %.17g by %s%s%s; states must be finite. Remedy: check that map and the "
+                   "parameters.",
+                   NAME_AT(m, state_name(m, i)), engine->reset.x[i], t,
+                   starts ? "its start value" : "the jump map of '", starts ? "" : NAME_AT(m, m->jumps[jump].name), starts ? "" : "'");
+}
+
+bool accept_state(Engine *engine, size_t jump, const Point *point)
+{
+    const Model *m = engine->model;
+    for (size_t i = 0; i < m->n_states + m->n_discrete; i++)
         if (!isfinite(engine->reset.x[i]))
-            return problem(engine, ENDED_NOT_FINITE,
-                           "'%s' becomes %g at t = %.17g by %s; states must be finite. Remedy: check that map and the "
-                           "parameters.",
-                           name, engine->reset.x[i], *point->time, source);
-    }
+            return not_finite(engine, jump, i, *point->time);
     copy_values(point->x, engine->reset.x, m->n_states + m->n_discrete);
     *point->step = 0.0;
     return true;
@@ -51,14 +57,10 @@ static bool evaluate_reset(Engine *engine, size_t jump, const Point *point)
 
 bool apply_reset(Engine *engine, size_t jump, const Point *point)
 {
-    const char *name = name_at(engine->model, engine->model->jumps[jump].name);
-    char source[MESSAGE_SIZE / 4];
-    if (!evaluate_reset(engine, jump, point))
-        return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.", name,
-                       *point->time);
-    snprintf(source, sizeof source, "the jump map of '%s'", name);
-    end_text_cleanly(source);
-    return accept_state(engine, source, point);
+    if (evaluate_reset(engine, jump, point))
+        return accept_state(engine, jump, point);
+    return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
+                   NAME_AT(engine->model, engine->model->jumps[jump].name), *point->time);
 }
 
 bool evaluate_times(Engine *engine, const Point *point)
@@ -74,7 +76,7 @@ bool evaluate_times(Engine *engine, const Point *point)
             return problem(engine, ENDED_NOT_FINITE,
                            "The time of '%s' is not a number at t = %.17g; a time event needs a time (infinity: "
                            "never). Remedy: check its expression and the parameters.",
-                           name_at(m, m->jumps[j].name), *point->time);
+                           NAME_AT(m, m->jumps[j].name), *point->time);
     return true;
 }
 
@@ -89,7 +91,7 @@ static bool stuck_in_time(Engine *engine, size_t jump, double t)
                    "Zeno: time events, the last of them '%s', were taken more than %zu times at t = %.17g s; the next "
                    "time must lie after the present one. Remedy: let the jump map move the time on past it, or start "
                    "with the next time to come.",
-                   name_at(engine->model, engine->model->jumps[jump].name), time_jumps_allowed(engine), t);
+                   NAME_AT(engine->model, engine->model->jumps[jump].name), time_jumps_allowed(engine), t);
 }
 
 /* The first breakpoint of the flow that is due, n_jumps if there is none. */
@@ -203,8 +205,7 @@ static bool take_jump(Engine *engine, size_t jump)
     engine->live.level[engine->model->n_margins] = 0.0;
     tick(engine, jump);
     if (engine->jump_hook)
-        engine->jump_hook(engine->jump_context, *engine->live.time,
-                          name_at(engine->model, engine->model->jumps[jump].name));
+        engine->jump_hook(engine->jump_context, *engine->live.time, jump);
     return count_jump(engine, jump) || end_run(engine);
 }
 
@@ -214,7 +215,7 @@ bool engine_start(Engine *engine)
     if (!evaluate(engine, engine->model->start, *engine->live.time, engine->live.x, engine->live.z, engine->reset.x,
                   engine->reset.z))
         return problem(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.", engine->model->name);
-    return accept_state(engine, "its start value", &engine->live) && take_internal_jumps(engine, &engine->live);
+    return accept_state(engine, engine->model->n_jumps, &engine->live) && take_internal_jumps(engine, &engine->live);
 }
 
 size_t engine_pending(Engine *engine)

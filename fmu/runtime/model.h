@@ -23,8 +23,11 @@ typedef int (*ModelReset)(size_t jump, const double **arg, double **res, long lo
 
 typedef enum { JUMP_ON_STATE, JUMP_ON_TIME } JumpKind;
 
-/* Names are places in one text, and numbers are short: large models have tens of thousands of variables. */
-typedef uint32_t ModelName;
+/* Names are two places in one text, of what comes up to the last dot and of the rest: large models have tens of
+   thousands of variables, whose names begin alike and end alike. */
+typedef struct {
+    uint32_t head, tail;
+} ModelName;
 
 typedef struct {
     ModelName name;
@@ -77,13 +80,13 @@ typedef struct {
     const size_t *clock_jump;          /* n_clocks: the jump with which each clock ticks */
     const ModelVariable *variables;    /* value reference = index in this table; 0 is the time */
     const ModelName *state_names, *discrete_names, *margin_names;
-    const char *names;                 /* one after the other, each with its end */
+    const char *names;                 /* heads and tails one after the other, each with its end */
 } Model;
 
-static inline const char *name_at(const Model *m, ModelName name)
-{
-    return m->names + name;
-}
+/* A name as a text that lives as long as the block in which this stands. */
+#define NAME_SIZE 256
+#define NAME_AT(model, name) write_name((model), (name), (char[NAME_SIZE]){0})
+const char *write_name(const Model *m, ModelName name, char text[NAME_SIZE]);
 
 extern const Model model;
 

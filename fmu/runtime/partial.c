@@ -30,7 +30,7 @@ static Answer check_direction(const Instance *instance, const char *function, co
             return ANSWER_ERROR;
         if (variable->type != TYPE_FLOAT64 || place_of(variable, known) == N_SEEDS)
             return refuse(instance, "%s: %s: '%s' is none of the %s that derivatives are of.", instance->name,
-                          function, name_at(&model, variable->name), known ? "knowns" : "unknowns");
+                          function, NAME_AT(&model, variable->name), known ? "knowns" : "unknowns");
         needed += variable->size;
     }
     if (direction->n_values != needed)

@@ -129,7 +129,7 @@ bool end_run(Engine *engine);
 void copy_values(double *to, const double *from, size_t n);
 void copy_point(const Engine *engine, const Point *from, const Point *to);
 /* The name of continuous state i, or from n_states on that of a discrete one. */
-const char *state_name(const Model *m, size_t i);
+ModelName state_name(const Model *m, size_t i);
 /* The values of a state for a message: "h = 0.1, v = -4.4". */
 const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size);
 
@@ -146,8 +146,9 @@ void clear_levels(const Engine *engine, const Point *point);
 void changed(Engine *engine);
 
 /* jumps.c */
-/* Copies the new state in engine->reset into the point if all of it is finite. */
-bool accept_state(Engine *engine, const char *source, const Point *point);
+/* Copies the new state in engine->reset into the point if all of it is finite; it comes from a jump, or
+   (n_jumps) from the start map. */
+bool accept_state(Engine *engine, size_t jump, const Point *point);
 bool apply_reset(Engine *engine, size_t jump, const Point *point);
 bool evaluate_times(Engine *engine, const Point *point);
 /* Takes the breakpoints of the flow that are due and come before any visible jump. */

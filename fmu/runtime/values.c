@@ -75,7 +75,7 @@ static bool show(Engine *engine, View view)
                       engine->reset.z))
             return problem(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.",
                            engine->model->name);
-        return accept_state(engine, "its start value", shown);
+        return accept_state(engine, engine->model->n_jumps, shown);
     }
     if (view == VIEW_PENDING && engine->status->ending == ENDED_NOT) {
         if (!take_internal_jumps(engine, shown) || !first_enabled(engine, shown, &jump))

@@ -53,7 +53,7 @@ static bool shrinking(const JumpHistory *history, double *gap, double *ratio)
 bool zeno_record(Engine *engine, size_t jump)
 {
     JumpHistory *history = &engine->history[jump];
-    const char *name = name_at(engine->model, engine->model->jumps[jump].name);
+    const char *name = NAME_AT(engine->model, engine->model->jumps[jump].name);
     double t = *engine->live.time, gap = 0.0, ratio = 0.0;
     remember(history, t);
     unsigned long long total = history->total, at_once = history->at_once, burst = history->burst;

@@ -1,4 +1,4 @@
-"""Many names in little room: a network's variables share their beginnings (the part) and their ends (the variable).
+"""Many names in little room: variables of large models share their beginnings (the part) and their ends (the variable).
 
 A pointer to each name would take eight bytes, an entry for the loader of three times that, and the whole name. Here a
 name is a pair of places in one text: that of its head, up to the last dot, and that of its tail.

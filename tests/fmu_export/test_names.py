@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from fmu.network_names import NameTable
+from fmu.names import NameTable
 
 NAMES = ["x", "agent1.x", "agent1.weights.phase[3]", "der(agent2.x)", "margin.agent2.jump", "Höhe.h", 'a."b"\\?', ""]
 
