@@ -56,18 +56,17 @@ Answer instance_set_clocks(void *handle, const char *function, const Reference r
     return instance ? check_countdowns(instance, function, references, n, active) : ANSWER_ERROR;
 }
 
-Answer instance_get_intervals(void *handle, const char *function, const Reference references[], size_t n,
-                              double intervals[], Qualifier qualifiers[])
+Answer instance_get_interval(void *handle, const char *function, const Reference references[], size_t n,
+                             const void *places, double *interval, Qualifier *qualifier)
 {
     Instance *instance = enter(handle, function, MODE_INITIALIZATION | MODE_EVENT);
-    if (!instance || check_countdowns(instance, function, references, n, intervals) != ANSWER_OK)
+    if (!instance || check_countdowns(instance, function, references, n, places) != ANSWER_OK)
         return ANSWER_ERROR;
     Run *run = instance->run;
     bool known = isfinite(run->next_event) && run->mode == MODE_EVENT;
-    for (size_t i = 0; i < n; i++) {
-        intervals[i] = known ? fmax(run->next_event - run->time, 0.0) : 0.0;
-        qualifiers[i] = !known ? INTERVAL_NOT_YET_KNOWN : run->interval_told ? INTERVAL_UNCHANGED : INTERVAL_CHANGED;
+    *interval = known ? fmax(run->next_event - run->time, 0.0) : 0.0;
+    *qualifier = !known ? INTERVAL_NOT_YET_KNOWN : run->interval_told ? INTERVAL_UNCHANGED : INTERVAL_CHANGED;
+    if (n > 0)
         run->interval_told = known;
-    }
     return ANSWER_OK;
 }

@@ -85,17 +85,15 @@ fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReferenc
                                   size_t nValueReferences, fmi3Float64 intervals[],
                                   fmi3IntervalQualifier qualifiers[])
 {
-    if (nValueReferences > 0 && instance && !qualifiers)
-        return status_of(null_argument(instance, __func__));
-    for (size_t i = 0; i < nValueReferences; i++) {
-        Qualifier qualifier = INTERVAL_NOT_YET_KNOWN;
-        Answer answer = instance_get_intervals(instance, __func__, valueReferences ? valueReferences + i : NULL, 1,
-                                               intervals ? intervals + i : NULL, &qualifier);
-        if (answer != ANSWER_OK)
-            return status_of(answer);
+    double interval = 0.0;
+    Qualifier qualifier = INTERVAL_NOT_YET_KNOWN;
+    Answer answer = instance_get_interval(instance, __func__, valueReferences, nValueReferences,
+                                          qualifiers ? intervals : NULL, &interval, &qualifier);
+    for (size_t i = 0; answer == ANSWER_OK && i < nValueReferences; i++) {
+        intervals[i] = interval;
         qualifiers[i] = (fmi3IntervalQualifier)qualifier;
     }
-    return enter(instance, __func__, MODE_INITIALIZATION | MODE_EVENT) ? fmi3OK : fmi3Error;
+    return status_of(answer);
 }
 
 /* ---- saved states ---- */

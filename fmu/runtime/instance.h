@@ -116,8 +116,9 @@ Answer instance_set_clocks(void *handle, const char *function, const Reference r
                            const bool active[]);
 /* An interval as the standard's qualifiers see it, numbered as they are. */
 typedef enum { INTERVAL_NOT_YET_KNOWN, INTERVAL_UNCHANGED, INTERVAL_CHANGED } Qualifier;
-Answer instance_get_intervals(void *handle, const char *function, const Reference references[], size_t n,
-                              double intervals[], Qualifier qualifiers[]);
+/* The interval of the countdown clocks referred to, which is one for all; `places` is where the importer wants it. */
+Answer instance_get_interval(void *handle, const char *function, const Reference references[], size_t n,
+                             const void *places, double *interval, Qualifier *qualifier);
 
 /* saved.c: saved and serialised states */
 
