@@ -122,7 +122,7 @@ def changes_by_time(steps):
 def step_through(path, t_stop, points, *, steps=None, names=(), start=None):
     """Run an FMU of Co-Simulation for FMI 2.0 through communication points; inputs change at some of them."""
     changes = changes_by_time(steps or {})
-    every = sorted({0.0, t_stop, *points, *changes})
+    every = sorted({0.0, t_stop, *points, *(t for t in changes if t < t_stop)})
     with Importer(path, "cs") as importer:
         importer.initialize(t_stop, **(start or {}))
         if 0.0 in points:
