@@ -207,6 +207,8 @@ static bool follow_steps(Engine *engine, double target, double quiet_until)
             return true;
         clear_levels(engine, &engine->live);
         double limit = fmin(quiet_until, next_time(engine, &engine->live, false, true));
+        if (*engine->live.step > 0.0)
+            limit = fmin(limit, *engine->live.time + SEGMENT_PART * *engine->live.step);
         if (!step_begin(engine, &engine->live) || !step_accept(engine, &engine->live, limit))
             return false;
         segment_keep(engine);

@@ -27,6 +27,9 @@
 #define ADVANCE_STEPS 1000000
 /* So many steps of the importer are looked ahead at once. */
 #define STEPS_AHEAD 64.0
+/* A step that communication points are read from is that much shorter than its error allows: the error of the
+   interpolation is some ten times as great, and falls with the fifth power. */
+#define SEGMENT_PART 0.35
 /* Jumps at one instant: of each jump on the state, and of the time events together, times their number. */
 #define JUMPS_AT_ONE_TIME 1000
 
