@@ -1,13 +1,14 @@
 """Every function of both versions: arguments for it, and the modes in which the standards allow it to be called."""
 
 import ctypes as c
-from functools import partial
+import math
 from typing import NamedTuple
 
 from fmu_driver2 import DISCARD, OK, EventInfo, doubles, references
 
 SETTLED = {"event", "step", "continuous"}
 RUNNING = SETTLED | {"initialization", "terminated"}
+FLOATS = ("Real", "Float64")
 ANY = RUNNING | {"instantiated", "configuration"}
 BEFORE_THE_END = ANY - {"terminated"}
 
@@ -41,17 +42,22 @@ def one_value(o):
     return (references([0]), c.c_size_t(1), room(o)) + (() if o.binary.version == 2 else (c.c_size_t(1),))
 
 
-def direction(known, o):
-    a = references([o.binary.reference("a")]), c.c_size_t(1)
-    rate = references([o.binary.reference("der(a)")]), c.c_size_t(1)
+def direction(o):
+    """Along the first state (or array of states), of its rate."""
+    state = o.binary.states[0]
+    n = math.prod(o.binary.variables[state].shape or ())
+    known, unknown = ((references([o.binary.reference(name)]), c.c_size_t(1)) for name in (state, f"der({state})"))
     if o.binary.version == 2:
-        return *rate, *a, doubles([1.0]), room(o)
-    return *rate, *a, doubles([1.0]), c.c_size_t(1), room(o), c.c_size_t(1)
+        return *unknown, *known, doubles([1.0]), room(o)
+    return *unknown, *known, doubles([1.0] * n), c.c_size_t(n), room(o, n=n), c.c_size_t(n)
 
 
 def output_rate(o):
-    more = () if o.binary.version == 2 else (c.c_size_t(1),)
-    return references([o.binary.reference("a")]), c.c_size_t(1), (c.c_int32 * 1)(1), room(o), *more
+    name = next(name for name, v in o.binary.variables.items() if v.causality == "output" and v.type in FLOATS
+                and v.variability == "continuous")  # fmt: skip
+    n = math.prod(o.binary.variables[name].shape or ())
+    more = () if o.binary.version == 2 else (c.c_size_t(n),)
+    return references([o.binary.reference(name)]), c.c_size_t(1), (c.c_int32 * 1)(1), room(o, n=n), *more
 
 
 def discrete_states(o):
@@ -132,8 +138,8 @@ TABLE = {
     "SerializeFMUState": Case(lambda o: (o.saved, *data(o)), ANY, ANY),
     "DeserializeFMUState": Case(lambda o: (*data(o), c.byref(c.c_void_p())), ANY, ANY),
     # Derivatives. FMI 2.0 has no entry for them in the mode between steps of its tables, and one for after a step.
-    "GetDirectionalDerivative": Case(partial(direction, "a"), RUNNING, RUNNING),
-    "GetAdjointDerivative": Case(partial(direction, "a"), RUNNING, RUNNING, 3),
+    "GetDirectionalDerivative": Case(direction, RUNNING, RUNNING),
+    "GetAdjointDerivative": Case(direction, RUNNING, RUNNING, 3),
     "GetOutputDerivatives": Case(output_rate, AFTER_STEPS, NONE),
     # Events and steps. FMI 2.0 lets Event Mode be entered anew from Event Mode.
     "EnterEventMode": Case(fixed(), {"step"}, {"continuous"}, 3),
@@ -161,7 +167,7 @@ TABLE = {
     "GetNumberOfContinuousStates": Case(lambda o: (c.byref(c.c_size_t()),), ANY, ANY, 3),
     "GetNumberOfEventIndicators": Case(lambda o: (c.byref(c.c_size_t()),), ANY, ANY, 3),
     # Clocks. Outside Event Mode no clock ticks, and that can be read.
-    "GetClock": Case(lambda o: (*clock("ticks_a", o), room(o, c.c_bool)), ANY, ANY, 3),
+    "GetClock": Case(lambda o: (*clock(o.binary.clocks[0], o), room(o, c.c_bool)), ANY, ANY, 3),
     "SetClock": Case(lambda o: (*clock("next_event", o), room(o, c.c_bool)), {"event"}, {"event"}, 3),
     "GetIntervalDecimal": Case(
         lambda o: (*clock("next_event", o), room(o), room(o, c.c_int)),
