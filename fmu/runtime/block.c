@@ -240,17 +240,46 @@ void *engine_wrapper_in(const Engine *engine, void *block)
     return other.wrapper;
 }
 
+static bool all_finite(const double *values, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(values[i]))
+            return false;
+    return true;
+}
+
+/* Time, step and states are numbers; a level is one, or infinite where a margin is. */
+static bool point_is_sound(const Model *m, const Point *point)
+{
+    bool sound = all_finite(point->time, 2 + m->n_states + m->n_discrete) && *point->step >= 0.0;
+    for (size_t i = 0; i <= m->n_margins; i++)
+        sound = sound && !isnan(point->level[i]);
+    return sound;
+}
+
+static bool segment_is_sound(const Engine *engine)
+{
+    const Status *status = engine->status;
+    bool sound = isfinite(status->segment_begin) && isfinite(status->segment_end) &&
+                 status->segment_begin < status->segment_end;
+    for (size_t i = 0; i < N_SEGMENT; i++)
+        sound = sound && all_finite(engine->segment[i], engine->model->n_states);
+    return sound || !status->has_segment;
+}
+
 bool engine_block_is_sound(const Engine *engine, void *block)
 {
+    const Model *m = engine->model;
     Engine other = *engine;
     lay_out_block(&other, block);
     const Status *status = other.status;
     bool sound = status->ending >= ENDED_NOT && status->ending <= ENDED_FAILED &&
                  status->prediction >= PREDICTION_NONE && status->prediction <= PREDICTION_QUIET &&
                  memchr(status->message, '\0', sizeof status->message) != NULL &&
-                 status->relative_tolerance >= RELATIVE_TOLERANCE && status->absolute_tolerance > 0.0;
-    for (size_t j = 0; j < engine->model->n_jumps; j++)
+                 status->relative_tolerance >= RELATIVE_TOLERANCE &&
+                 status->relative_tolerance <= RELATIVE_TOLERANCE_MOST && status->absolute_tolerance > 0.0;
+    for (size_t j = 0; j < m->n_jumps; j++)
         sound = sound && other.history[j].stored <= N_ZENO_TIMES;
-    sound = sound && (!status->has_segment || status->segment_begin < status->segment_end);
-    return sound && isfinite(*other.live.time) && !isnan(*other.predicted.time);
+    return sound && point_is_sound(m, &other.live) && point_is_sound(m, &other.predicted) &&
+           all_finite(other.u, m->n_inputs) && all_finite(other.p, m->n_parameters) && segment_is_sound(&other);
 }
