@@ -13,6 +13,7 @@ from fmu.names import NameTable
 from fmu.network import NetworkTrace
 from fmu.trace import Trace
 from fmu.variables import FmuVariable
+from hybrid_model.layout import Layout
 from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import Kind
 
@@ -103,6 +104,7 @@ def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> l
     margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
     tables = [
         *(_array("double ", f"start_{name}", map(_number, layout.start(kind))) for name, kind in starts),
+        _array("double ", "nominals", map(_number, _nominals(layout))),
         _array("ModelName ", "state_names", map(names.entry, layout.names(Kind.STATE))),
         _array("ModelName ", "discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
         _array("ModelName ", "margin_names", map(names.entry, margin_names)),
@@ -111,6 +113,12 @@ def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> l
         _array("ModelVariable ", "variables", (_variable(variable, names) for variable in variables)),
     ]
     return [*tables, names.definition("names")]
+
+
+def _nominals(layout: Layout) -> list[float]:
+    """Return a usual size of each continuous state, 1 where none is declared."""
+    variables = [place.variable for place in layout.places[Kind.STATE]]
+    return [1.0 if v.nominal is None else v.nominal for v in variables for _ in range(v.size)]
 
 
 def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
@@ -158,7 +166,7 @@ def _model(
         "predictable": _bool(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
         **{name: f"hybrid_{name}" for name in _MAPS},
-        **{name: name for name in ("jumps", "clock_jump", "variables")},
+        **{name: name for name in ("nominals", "jumps", "clock_jump", "variables")},
         **{name: name for name in ("state_names", "discrete_names", "margin_names", "names")},
     }
     return "const Model model = {\n" + "".join(f"    .{key} = {value},\n" for key, value in fields.items()) + "};\n"

@@ -13,6 +13,7 @@ from fmu.description_parts import (
     add_units,
     generation_tool,
     listing,
+    range_attributes,
     start_text,
     summary,
     to_bytes,
@@ -116,6 +117,7 @@ def _variable(listed: ET.Element, description: Description, reference: int) -> N
         typed["unit"] = unit
     if variable.start is not None:
         typed["start"] = start_text(variable)
+    typed |= range_attributes(variable)
     if variable.derivative_of is not None:
         # Variables are counted from 1 here.
         typed["derivative"] = str(description.position[variable.derivative_of] + 1)

@@ -13,6 +13,7 @@ from fmu.description_parts import (
     add_units,
     generation_tool,
     listing,
+    range_attributes,
     start_text,
     summary,
     to_bytes,
@@ -120,8 +121,7 @@ def _variable(listed: ET.Element, description: Description, reference: int) -> N
         attributes["unit"] = unit
     if variable.start is not None:
         attributes["start"] = start_text(variable)
-        if variable.bank is Bank.SIZE:
-            attributes |= {"min": attributes["start"], "max": attributes["start"]}
+    attributes |= range_attributes(variable)
     if variable.derivative_of is not None:
         attributes["derivative"] = str(description.position[variable.derivative_of])
     if description.is_reset(variable):

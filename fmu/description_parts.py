@@ -161,6 +161,14 @@ def start_text(variable: FmuVariable) -> str:
     return " ".join(number(value) for value in variable.start)
 
 
+def range_attributes(variable: FmuVariable) -> dict[str, str]:
+    """Return the attributes of a variable's range and size, in the order of the schemas."""
+    found = {"min": variable.minimum, "max": variable.maximum}
+    if variable.type is FmiType.FLOAT64:
+        found["nominal"] = variable.nominal
+    return {key: number(value) for key, value in found.items() if value is not None}
+
+
 def listing(numbers: Iterable[int]) -> str:
     """Return numbers joined by spaces."""
     return " ".join(map(str, numbers))

@@ -84,6 +84,8 @@ class FmuVariable:
         Names of the structural parameters that give the shape, where there are any.
     derivative_of : str or None
         The state whose time derivative this is.
+    minimum, maximum, nominal : float or None
+        As declared.
     """
 
     name: str
@@ -99,6 +101,9 @@ class FmuVariable:
     shape: tuple[int, ...] = ()
     dimensions: tuple[str, ...] = ()
     derivative_of: str | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
 
     @property
     def size(self) -> int:
@@ -192,6 +197,9 @@ def _declared(kind: Kind, place: Place, fmi: Fmi) -> list[FmuVariable]:
         variable.description,
         variable.shape,
         variable.dimensions,
+        minimum=variable.minimum,
+        maximum=variable.maximum,
+        nominal=variable.nominal,
     )
     if fmi is Fmi.V3_0 and variable.shape and causality in ("parameter", "local"):
         return [whole] if variable.size else []
@@ -231,6 +239,9 @@ def _derivative(state: FmuVariable) -> FmuVariable:
         unit=unit_per_second(state.unit),
         description=f"time derivative of {state.name}",
         derivative_of=state.name,
+        minimum=None,
+        maximum=None,
+        nominal=None,
     )
 
 
@@ -276,6 +287,8 @@ def _sizes(table: Sequence[FmuVariable]) -> list[FmuVariable]:
             "exact",
             (float(length),),
             description="length, fixed in this FMU",
+            minimum=length,
+            maximum=length,
         )
         for name, length in lengths.items()
     ]

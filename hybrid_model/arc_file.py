@@ -191,6 +191,7 @@ def _automaton(about: Table, starts: FloatArray) -> RecordedAutomaton:
         size = int(np.prod(shape))
         start = starts[at : at + size].reshape(shape)
         flags = {key: value for key, value in entry.items() if key not in ("kind", "shape")}
+        flags["dimensions"] = tuple(flags.get("dimensions", ()))
         variables.append(Variable(kind=Kind[entry["kind"]], start=start, **flags))
         at += size
     return RecordedAutomaton(

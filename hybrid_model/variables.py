@@ -53,6 +53,10 @@ class Variable:
         The start value comes from ``start_map``.
     dimensions : tuple of str
         Names of the lengths that give the shape, where they have names.
+    minimum, maximum : float or None
+        Between them, both included, lie the values that make sense; for people and for importers of an FMU.
+    nominal : float or None
+        A usual size of the value, above zero, by which solvers can scale.
     """
 
     name: str
@@ -66,6 +70,9 @@ class Variable:
     internal: bool = False
     computed: bool = False
     dimensions: tuple[str, ...] = ()
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -104,6 +111,8 @@ class Declaration:
         See `Variable`.
     shape : str or tuple of str, optional
         Names of the automaton's `Dimension` attributes.
+    minimum, maximum, nominal : float, optional
+        See `Variable`.
     **traits : bool
         The flags of `Variable`.
     """
@@ -117,9 +126,13 @@ class Declaration:
         unit: str = "",
         description: str = "",
         shape: str | tuple[str, ...] = (),
+        minimum: float | None = None,
+        maximum: float | None = None,
+        nominal: float | None = None,
         **traits: bool,
     ) -> None:
         self.start = start
+        self.minimum, self.maximum, self.nominal = minimum, maximum, nominal
         self.unit = unit
         self.description = description
         self.shape = (shape,) if isinstance(shape, str) else shape
@@ -131,7 +144,7 @@ class Declaration:
         Raises
         ------
         DeclarationError
-            If the value has the wrong shape or is not finite.
+            If the value has the wrong shape, is not finite, or lies outside the range declared.
         """
         given = start_array(f"{owner}.{name}", value)
         unknown = [dimension for dimension in self.shape if dimension not in sizes]
@@ -149,7 +162,34 @@ class Declaration:
         start = np.full(shape, given) if given.shape == () else given
         if self.traits.get("integer") and not np.all(start == np.round(start)):
             raise DeclarationError(f"{owner}.{name} holds whole numbers, but its start value is {start}: round it.")
-        return Variable(name, self.kind, start, self.unit, self.description, **self.traits, dimensions=self.shape)
+        self._check_range(f"{owner}.{name}", start)
+        return Variable(
+            name,
+            self.kind,
+            start,
+            self.unit,
+            self.description,
+            **self.traits,
+            dimensions=self.shape,
+            minimum=self.minimum,
+            maximum=self.maximum,
+            nominal=self.nominal,
+        )
+
+    def _check_range(self, name: str, start: FloatArray) -> None:
+        low = -np.inf if self.minimum is None else self.minimum
+        high = np.inf if self.maximum is None else self.maximum
+        if not low <= high:
+            raise DeclarationError(f"{name} is declared from minimum {low:g} to maximum {high:g}: exchange them.")
+        if self.nominal is not None and not 0.0 < self.nominal < np.inf:
+            raise DeclarationError(f"{name} has the nominal value {self.nominal:g}: give a finite size above zero.")
+        # Computed starts and outputs have no value yet.
+        given = self.kind is not Kind.OUTPUT and not self.traits.get("computed")
+        outside = start[(start < low) | (start > high)]
+        if given and outside.size:
+            raise DeclarationError(
+                f"{name} = {outside.flat[0]:g} lies outside its range from {low:g} to {high:g}: give a value within it."
+            )
 
 
 def start_array(name: str, value: npt.ArrayLike) -> FloatArray:
@@ -181,7 +221,7 @@ class State(Declaration):
     computed : bool
         Whether the start value comes from ``start_map``.
     **options
-        ``unit``, ``description``, ``shape``: see `Declaration`.
+        ``unit``, ``description``, ``shape``, ``minimum``, ``maximum``, ``nominal``: see `Declaration`.
     """
 
     kind = Kind.STATE
@@ -206,7 +246,7 @@ class DiscreteState(Declaration):
     internal : bool
         Whether it is bookkeeping that nobody outside the block needs to see.
     **options
-        ``unit``, ``description``, ``shape``: see `Declaration`.
+        ``unit``, ``description``, ``shape``, ``minimum``, ``maximum``, ``nominal``: see `Declaration`.
     """
 
     kind = Kind.DISCRETE
@@ -234,7 +274,7 @@ class Parameter(Declaration):
     integer : bool
         Whether it holds whole numbers.
     **options
-        ``unit``, ``description``, ``shape``: see `Declaration`.
+        ``unit``, ``description``, ``shape``, ``minimum``, ``maximum``, ``nominal``: see `Declaration`.
     """
 
     kind = Kind.PARAMETER
@@ -253,7 +293,7 @@ class Input(Declaration):
     discrete : bool
         Whether it changes only at events. A block whose inputs are all discrete can predict its next event.
     **options
-        ``unit``, ``description``, ``shape``: see `Declaration`.
+        ``unit``, ``description``, ``shape``, ``minimum``, ``maximum``, ``nominal``: see `Declaration`.
     """
 
     kind = Kind.INPUT
@@ -270,7 +310,7 @@ class Output(Declaration):
     discrete : bool
         Whether it changes only at events.
     **options
-        ``unit``, ``description``, ``shape``: see `Declaration`.
+        ``unit``, ``description``, ``shape``, ``minimum``, ``maximum``, ``nominal``: see `Declaration`.
     """
 
     kind = Kind.OUTPUT

@@ -1,13 +1,19 @@
 """Declarations: what may be declared, what an instance may be given, and the sentence for each mistake."""
 
+import ctypes
 import math
 
+import fmpy
+import fmpy.fmi2
+import fmpy.fmi3
 import numpy as np
 import pytest
 
 import hybrid_model as hm
 from fmu.errors import TraceError
+from fmu.export import export_fmu
 from fmu.trace import trace
+from hybrid_model.errors import DeclarationError
 from hybrid_model.models import BouncingBall
 from hybrid_model.variables import Kind, element_names
 
@@ -383,3 +389,79 @@ def test_a_jump_that_gives_an_integer_state_a_fraction_is_refused():
 def test_a_plain_function_on_a_discrete_input_is_refused():
     with pytest.raises(hm.DeclarationError, match=r"input u changes at jumps only.*Signal"):
         hm.simulate(Follower(), 2.0, inputs={"u": lambda t: t})
+
+
+class Ranged(hm.HybridAutomaton):
+    n = hm.Dimension()
+    share = hm.Parameter(0.5, minimum=0.0, maximum=1.0)
+    level = hm.State(2.0, shape="n", minimum=0.0, nominal=10.0)
+    peak = hm.State(computed=True, minimum=1.0)
+    total = hm.Output(minimum=5.0)
+
+    def flow_map(self, s):
+        return {"level": -s.share * s.level, "peak": 0.0}
+
+    def start_map(self, s):
+        return {"peak": np.max(s.level) + 1.0}
+
+    def outputs(self, s):
+        return {"total": np.sum(s.level)}
+
+
+def test_a_range_holds_the_values_that_are_given():
+    block = Ranged(n=2, share=1.0, level=[0.0, 3.0])
+    share, level = block.variables[:2]
+    assert (share.minimum, share.maximum, share.nominal) == (0.0, 1.0, None)
+    assert (level.minimum, level.maximum, level.nominal) == (0.0, None, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"share": 1.5}, r"Ranged.share = 1.5 lies outside its range from 0 to 1: give a value within it\."),
+        ({"level": [1.0, -2.0]}, r"Ranged.level = -2 lies outside its range from 0 to inf: give a value within it\."),
+    ],
+)
+def test_values_outside_a_range_are_refused(values, sentence):
+    with pytest.raises(DeclarationError, match=f"^{sentence}$"):
+        Ranged(n=2, **values)
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"minimum": 2.0, "maximum": 1.0}, "from minimum 2 to maximum 1: exchange them"),
+        ({"minimum": math.nan}, "from minimum nan to maximum inf: exchange them"),
+        ({"nominal": 0.0}, "the nominal value 0: give a finite size above zero"),
+        ({"nominal": math.inf}, "the nominal value inf: give a finite size above zero"),
+    ],
+)
+def test_ranges_and_sizes_that_cannot_be_are_refused(options, sentence):
+    wrong = type("Wrong", (hm.HybridAutomaton,), {"a": hm.Parameter(1.5, **options)})
+    with pytest.raises(DeclarationError, match=sentence):
+        wrong()
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_ranges_and_sizes_reach_the_importer(fmi, tmp_path):
+    path = export_fmu(Ranged(n=2), tmp_path / "ranged.fmu", fmi=fmi)
+    variables = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+    level = variables["level" if fmi == "3.0" else "level[2]"]
+    assert (float(level.min), level.max, float(level.nominal)) == (0.0, None, 10.0)
+    assert (float(variables["share"].min), float(variables["share"].max)) == (0.0, 1.0)
+    assert variables["der(peak)"].min is None
+    kind = fmpy.fmi2.FMU2Model if fmi == "2.0" else fmpy.fmi3.FMU3Model
+    description = fmpy.read_model_description(str(path))
+    folder = fmpy.extract(str(path), str(tmp_path / "ranged"))
+    fmu = kind(
+        guid=description.guid or description.instantiationToken,
+        unzipDirectory=folder,
+        modelIdentifier="Ranged",
+        instanceName="ranged",
+    )
+    fmu.instantiate()
+    nominals = (ctypes.c_double * 3)()
+    getter = fmu.fmi2GetNominalsOfContinuousStates if fmi == "2.0" else fmu.fmi3GetNominalsOfContinuousStates
+    getter(fmu.component, nominals, 3)
+    assert list(nominals) == [10.0, 10.0, 1.0]
+    fmu.freeInstance()

@@ -64,6 +64,7 @@ typedef struct {
     bool has_flow_set;                 /* false: flow is allowed everywhere */
     bool predictable;                  /* all inputs discrete: the next event follows from the state */
     const double *x, *z, *u, *p;       /* start values */
+    const double *nominals;            /* a usual size of each continuous state */
     ModelFunction start;               /* (t,x,z,u,p) -> x0, z0: start values that are computed; copies the others */
     ModelFunction flow;                /* -> dx/dt (n_states) */
     ModelFunction flow_set;            /* -> margin (1); used when has_flow_set */

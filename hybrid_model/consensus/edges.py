@@ -45,7 +45,9 @@ class GateClock(hm.HybridAutomaton):
         0, shape="degree", integer=True, internal=True, computed=True, description="segment of the gate: even is on"
     )
     gate_rate = hm.Parameter(4.0, shape="degree", unit="rad/s", description="rate of the gate")
-    duty_percent = hm.Parameter(20.0, shape="degree", description="share of each gate period that is on, in percent")
+    duty_percent = hm.Parameter(
+        20.0, shape="degree", minimum=0.0, maximum=100.0, description="share of each gate period that is on, in percent"
+    )
     phase = hm.Parameter(0.0, shape="degree", unit="rad", description="phase of the gate")
     weights = hm.Output(shape="degree", unit="1/s", description="weights of the edges")
 

@@ -13,7 +13,7 @@ class BouncingBall(hm.HybridAutomaton):
     h = hm.State(1.0, unit="m", description="height of the ball", output=True)
     v = hm.State(0.0, unit="m/s", description="velocity of the ball, upward", output=True)
     g = hm.Parameter(9.81, unit="m/s2", description="gravity")
-    e = hm.Parameter(0.7, description="coefficient of restitution")
+    e = hm.Parameter(0.7, minimum=0.0, maximum=1.0, description="coefficient of restitution")
     impact = hm.Clock("jump", description="ticks with each impact")
 
     def flow_map(self, s: hm.Values) -> dict[str, Value]:
