@@ -76,7 +76,7 @@ def reference(history):
         return [0.0, *(value for at, value in history.changes if at <= t)][-1]
 
     inputs = {"push": hm.Signal(push, sorted(set(times)))} if times else {}
-    return hm.simulate(Mix(x=[history.first, 0.3]), LAST + 0.01, t_start=history.t_start, inputs=inputs)
+    return hm.simulate(Mix(x=[history.first, 0.3]), LAST + 0.5, t_start=history.t_start, inputs=inputs)
 
 
 class Calls(RuleBasedStateMachine):
