@@ -72,3 +72,28 @@ def test_one_long_step_ends_at_the_accumulation_and_further_steps_are_refused(ex
     assert float(height) >= -1e-9
     assert "accumulate at t = 2.5586" in message
     assert last == "refused"
+
+
+INTEGRATED = """
+import sys, fmpy
+try:
+    result = fmpy.simulate_fmu(sys.argv[1], stop_time=5.0, output_interval=0.01, fmi_type=sys.argv[2])
+    print(result["time"][-1], min(result["h"]))
+except Exception as error:
+    print("refused", error)
+"""
+
+
+@pytest.mark.parametrize(("fmi", "kind"), [("2.0", "CoSimulation"), ("2.0", "ModelExchange"), ("3.0", "ModelExchange")])
+def test_other_versions_and_kinds_in_fmpy_end_as_well(fmi, kind, exported):
+    """FMI 2.0 by fmi2Discard with Terminated; Model Exchange by terminateSimulation, under the importer's CVode."""
+    path = exported(BouncingBall(), "ball", fmi)
+    command = [sys.executable, "-c", INTEGRATED, str(path), kind]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    assert "Zeno: " in done.stdout
+    end = done.stdout.strip().splitlines()[-1]
+    if not end.startswith("refused"):
+        time, lowest = map(float, end.split())
+        # CVode's own relative tolerance is 1e-5 there.
+        assert time == pytest.approx(ACCUMULATION, abs=1e-3)
+        assert lowest >= -1e-9
