@@ -143,6 +143,8 @@ size_t seed_count(const Model *model);
 /* Evaluates a function of the model at (t, x, z) with the present inputs and parameters. */
 bool evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
               double *second);
+/* Computes the state that a view shows, into engine->shown, once. */
+bool hold_view(Engine *engine, View view);
 /* Guards are enabled from zero on. */
 void clear_levels(const Engine *engine, const Point *point);
 /* Something that the future depends on has changed. */

@@ -43,7 +43,7 @@ bool engine_forward(Engine *engine, View view, double *const seeds[N_SEEDS])
 {
     const Model *m = engine->model;
     double *const *wanted = seeds + SEED_RATES;
-    if (!engine_values(engine, view, BANK_STATE))
+    if (!hold_view(engine, view))
         return false;
     if (view == VIEW_START) {
         if (!call(engine, m->start_forward, &engine->live, seeds, MODEL_N_ARG, seeds + SEED_SHOWN, 2))
@@ -66,7 +66,7 @@ bool engine_reverse(Engine *engine, View view, double *const seeds[N_SEEDS])
 {
     const Model *m = engine->model;
     double *back[N_SEEDS], *const *x = seeds + SEED_STATES;
-    if (!engine_values(engine, view, BANK_STATE) ||
+    if (!hold_view(engine, view) ||
         !call(engine, m->reverse, &engine->shown, seeds + SEED_RATES, 2, seeds, MODEL_N_ARG))
         return false;
     add(x[0], seeds[SEED_SHOWN], m->n_states);

@@ -93,8 +93,7 @@ void engine_set_states(Engine *engine, const double *x)
     changed(engine);
 }
 
-/* Computes the state that a view shows, once. */
-static bool hold_view(Engine *engine, View view)
+bool hold_view(Engine *engine, View view)
 {
     if (engine->view == view)
         return true;
@@ -136,6 +135,9 @@ const double *engine_values(Engine *engine, View view, Bank bank)
         return engine->u;
     if (bank == BANK_PARAMETER)
         return engine->p;
+    /* What is as it is need not be copied to be shown. */
+    if (view == VIEW_LIVE && (bank == BANK_STATE || bank == BANK_DISCRETE))
+        return bank == BANK_STATE ? engine->live.x : engine->live.z;
     if (!hold_view(engine, view))
         return NULL;
     switch (bank) {

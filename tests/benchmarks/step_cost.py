@@ -17,7 +17,6 @@ import tempfile
 from collections import defaultdict
 from dataclasses import dataclass, field
 from importlib.util import find_spec
-from inspect import signature
 from pathlib import Path
 
 import fmpy
@@ -159,10 +158,8 @@ def contenders(folder, reference=None):
     """All that can be had here: this project's ball, then what the others are compared with, then the rest."""
     base = [contender(REFERENCE, reference, folder)] if reference else []
     base += [euler_ball(folder, "-O2"), euler_ball(folder, "-O0")]
-    # Version 2.0 as soon as the exporter has it.
-    rest = [own_ball(folder, "2.0")] if "kinds" in signature(export_fmu).parameters else []
     packages = [package for package in ("pythonfmu3", "pythonfmu") if find_spec(package)]
-    return [own_ball(folder), *base, *rest, *(python_ball(folder, package) for package in packages)]
+    return [own_ball(folder), *base, own_ball(folder, "2.0"), *(python_ball(folder, package) for package in packages)]
 
 
 def groups(balls):
