@@ -13,6 +13,7 @@ from c_runs import (
     co_simulation,
     jumps_of,
     model_exchange,
+    only,
     python_run,
 )
 from c_witnesses import POLYNOMIAL, WITNESSES
@@ -42,7 +43,7 @@ MORE = {
     # A guard that is zero at the start is enabled.
     "on guard": Witness(Ramps(a=1.0, limit_a=1.0, name="on_guard"), 1.5, 3),
     # 3 * 0.1 and 0.3 are one time: the tick comes first and sees the old mode.
-    "rounded": Witness(Timers(period=0.1, hidden=0.3, name="rounded"), 1.05, 7),
+    "rounded": Witness(Timers(period=0.1, hidden=0.3, name="rounded"), 1.05, 21),
     # More jumps than there may be at one instant, in guards and in timers.
     "many": Witness(Counts(), 1.5, 3),
     # Within the tolerance of each other: one instant, in the order of the table.
@@ -159,6 +160,14 @@ def check_clocks_and_views(start):
     assert not event
     inside.do("plain", "event")
     assert inside.get("ticks_a") == 0.0
+    inside.do("plain", "step")
+    # Who does not ask in time learns nothing: the clocks are those of the last step.
+    event, *_ = inside.step(0.45, 0.2)
+    assert event
+    event, *_ = inside.step(0.65, 0.01)
+    assert not event
+    inside.do("plain", "event")
+    assert inside.get("ticks_a") == 0.0
 
 
 def check_outcome_is_shown_in_event_mode(start):
@@ -194,8 +203,8 @@ def check_cascades_are_one_visit(start):
     assert instance.iterate()[0] == 6
 
 
-def check_crossings_at_the_end(start):
-    """A guard that is crossed a rounding behind the stop time counts, one that is crossed later does not."""
+def check_crossings_at_the_ends(start):
+    """A guard crossed a rounding behind the stop time counts, one crossed later does not; one at the start does."""
     for fmi, events in (("2.0", False), ("3.0", False), ("3.0", True)):
         for shift, count in ((-1e-12, 1), (0.0, 1), (1e-12, 1), (3e-8, 0)):
             harness = start(Ramps(limit_a=1.0 + shift, name=f"end{count}{shift:g}"), fmi)
@@ -208,6 +217,12 @@ def check_crossings_at_the_end(start):
                 instance.do("plain", "event")
                 instance.iterate()
             assert instance.get("count_a") == count, (fmi, events, shift)
+        harness = start(MORE["on guard"].automaton, fmi)
+        instance = Instance(harness, events=events)
+        instance.boot()
+        if events:
+            instance.iterate()
+        assert instance.get("count_a") == 1.0
 
 
 def check_levels_are_saved(start):
@@ -372,7 +387,7 @@ def check_ends(start):
             instance.boot()
             _, terminate, _, time = instance.step(0.0, t_end)
             assert terminate, (automaton.name, fmi, time)
-            [message] = instance.log()
+            message = only(instance.log())
             assert word in message, (automaton.name, message)
             assert low - 1e-9 <= time <= high + 1e-9, (automaton.name, time)
             assert instance.call("step", time, 0.1)[0] == 3

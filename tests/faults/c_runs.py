@@ -82,6 +82,12 @@ def sample(instance, names):
     return {name: instance.get(name) for name in names}
 
 
+def only(messages):
+    """The single message that there is."""
+    assert len(messages) == 1, messages
+    return messages[0]
+
+
 def jumps_of(instance):
     return [(found[1], float(found[2])) for found in map(JUMP.search, instance.log()) if found]
 
