@@ -5,7 +5,6 @@ hand. Every status and every log line is kept, nothing is corrected or hidden.
 """
 
 import ctypes as c
-import itertools
 import math
 from typing import NamedTuple
 
@@ -300,9 +299,15 @@ class Component:
         return Update(status, again, terminate, changed, time.value if defined else None)
 
     def settle(self):
-        """Event Mode to its end, and on to Step Mode or Continuous-Time Mode; the last update."""
-        for _ in itertools.repeat(None, 2000):
+        """Event Mode to its end, and on to Step Mode or Continuous-Time Mode.
+
+        Returns the last update, with `states_changed` if any of them said so.
+        """
+        changed = False
+        for _ in range(2000):
             update = self.update()
+            changed = changed or update.states_changed
+            update = update._replace(states_changed=changed)
             assert update.status == OK, self.log[-3:]
             if update.terminate:
                 return update

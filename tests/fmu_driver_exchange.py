@@ -116,6 +116,8 @@ class Exchange:
                     (events if len(component.jumps) > n_jumps else idle).append(self.t)
                     if self.update.terminate:
                         return Record(samples, events, idle, True)
-                    x = self.states()
+                    new = self.states()
+                    assert self.update.states_changed or (new == x).all()
+                    x = new
             samples.append((self.t, x))
         return Record(samples, events, idle, False)

@@ -57,7 +57,12 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
 {
     Fmi3 made = prototype(CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
     (void)resourcePath, (void)visible;
-    for (size_t i = 0; requiredIntermediateVariables && i < nRequiredIntermediateVariables; i++)
+    if (nRequiredIntermediateVariables > 0 && !requiredIntermediateVariables) {
+        refuse(&made.base, "%s: there are %zu intermediate variables, but no place where they are.", __func__,
+               nRequiredIntermediateVariables);
+        return NULL;
+    }
+    for (size_t i = 0; i < nRequiredIntermediateVariables; i++)
         if (requiredIntermediateVariables[i] >= model.n_variables) {
             refuse(&made.base, "%s: there is no variable with the value reference %lu.", __func__,
                    (unsigned long)requiredIntermediateVariables[i]);

@@ -8,10 +8,12 @@ import ctypes as c
 import subprocess
 
 import pytest
-from fmu_driver2 import DISCARD, ERROR, OK, Binary
+from fmu_driver2 import DISCARD, ERROR, OK, Binary, Component
 from fmu_driver_calls import TABLE
 from fmu_driver_journey import SETTINGS, instance
-from witnesses import Ramps
+from witnesses import Cascade, Ramps
+
+from fmu.export import export_fmu
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +128,29 @@ def test_the_table_has_every_function(binaries):
         types = ("Float32", "Int8", "UInt8", "Int16", "UInt16", "UInt32", "Int64", "UInt64", "Binary")
         rest = {s for s in symbols - tested - kinds if not s.endswith(types)}
         assert rest == {f"fmi{version}GetVersion"} | ({"fmi2GetTypesPlatform"} if version == 2 else set())
+
+
+def test_version_2_works_without_callbacks(binaries):
+    functions, boolean = binaries["2.0"].functions, c.c_int(0)
+    assert functions.fmi2Instantiate(b"block", 1, b"another", None, None, boolean, boolean) is None
+    handle = functions.fmi2Instantiate(b"block", 1, binaries["2.0"].token, None, None, boolean, boolean)
+    assert functions.fmi2DoStep(c.c_void_p(handle), c.c_double(0.0), c.c_double(0.1), 1) == ERROR
+    assert functions.fmi2EnterInitializationMode(c.c_void_p(handle)) == OK
+    assert functions.fmi2ExitInitializationMode(c.c_void_p(handle)) == OK
+    assert functions.fmi2DoStep(c.c_void_p(handle), c.c_double(0.0), c.c_double(0.1), 1) == OK
+    functions.fmi2FreeInstance(c.c_void_p(handle))
+
+
+@pytest.mark.parametrize(("fmi", "kind", "other"), [("2.0", "me", "cs"), ("3.0", "cs", "me")])
+def test_a_kind_that_was_not_exported_gives_no_instance(fmi, kind, other, tmp_path):
+    binary = Binary(export_fmu(Cascade(), tmp_path / "one.fmu", fmi=fmi, kinds=[kind]))
+    component = Component(binary, kind)
+    component.begin()
+    component.free()
+    component = Component(binary, other)
+    assert component.handle is None
+    assert len(component.errors) == 1
+    assert "this FMU is not for" in component.errors[0]
 
 
 @pytest.mark.parametrize("label", SETTINGS)

@@ -204,6 +204,11 @@ def test_intermediate_variables_that_are_none_are_refused(binaries):
     component = Component(binary, "cs", required=[binary.reference("level"), len(binary.variables)])
     assert component.handle is None
     assert str(len(binary.variables)) in component.errors[0]
+    handle = binary.functions.fmi3InstantiateCoSimulation(
+        b"block", binary.token, None, *[c.c_bool(False)] * 4, None, c.c_size_t(1), None, component.listen, None
+    )
+    assert handle is None
+    assert len(component.errors) == 2
     component = Component(binary, "cs", required=[binary.reference("level"), binary.reference("inflow")])
     component.begin()
     component.free()
