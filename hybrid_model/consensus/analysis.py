@@ -53,6 +53,8 @@ class Analysis:
 
     def alike(self, scenario: Scenario) -> Analysis:
         """The analysis of the same network with other initial states or another trigger; what is known is kept."""
+        # Filled by whichever of the two is asked first.
+        _ = self._worst_cases, self._contractions
         other = replace(self, scenario=scenario)
         own = {field.name for field in fields(self)} | {"initial_disagreement"}
         other.__dict__.update({name: value for name, value in self.__dict__.items() if name not in own})
@@ -124,12 +126,18 @@ class Analysis:
         coarse = ReachableSets(self.scenario, self.cycle, 0.0, max(self.resolution, 0.05))
         return coarse.overshoot(self.spectrum.rate)
 
-    @cached_property
-    def contraction(self) -> float:
-        """``sup_t ||phi(t + C, t)||`` over the cycle C: the square root of the exact q (audit, section 5.3)."""
+    def contraction(self, cycles: int = 1) -> float:
+        """``sup_t ||phi(t + m C, t)||`` over m cycles C: the square root of the exact q (audit, section 5.3)."""
         if self.is_constant and self.spectrum is not None:
-            return math.exp(-self.spectrum.rate * self.cycle)
-        return self.reachable.contraction()
+            return math.exp(-self.spectrum.rate * self.cycle * cycles)
+        known: dict[int, float] = self._contractions
+        if cycles not in known:
+            known[cycles] = self.reachable.contraction(cycles)
+        return known[cycles]
+
+    @cached_property
+    def _contractions(self) -> dict[int, float]:
+        return {}
 
     @cached_property
     def initial_disagreement(self) -> NDArray[np.float64]:
@@ -139,12 +147,16 @@ class Analysis:
 
     def worst(self, decay: float) -> WorstCase:
         """The exact worst case for the threshold ``exp(-decay t)`` times the scenario's c; kept for further calls."""
-        known: dict[float, WorstCase] = self.__dict__.setdefault("_worst", {})
+        known = self._worst_cases
         if decay not in known:
             known[decay] = worst_case(
                 self.scenario, self.cycle, decay, self.resolution, periodic=self.is_periodic, threshold=1.0
             )
         return known[decay]
+
+    @cached_property
+    def _worst_cases(self) -> dict[float, WorstCase]:
+        return {}
 
     @cached_property
     def largest_weights(self) -> NDArray[np.float64]:

@@ -21,10 +21,10 @@ from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
 from hybrid_model.consensus.worst_case import WorstCase
 
-__all__ = ["Bounds", "is_lost", "with_threshold"]
+__all__ = ["Bounds", "with_threshold"]
 
-_LOST = 1e-9
-"""A Floquet multiplier below this has lost digits: the monodromy matrix is known to about 1e-14."""
+_LEAST_FORGOTTEN = 1.5e-3
+"""``(r - beta) C`` below which more cycles C count than `ReachableSets` adds up."""
 
 
 class _PartGap(Protocol):
@@ -73,18 +73,12 @@ class Bounds:
     def floquet_rate(self) -> float | None:
         """Exact rate [1/s]; None without a period."""
         spectrum = self.analysis.spectrum
-        if spectrum is None or not is_lost(self.analysis):
-            return None if spectrum is None else spectrum.rate
-        # After so long a period the monodromy matrix is made of rounding: take the product of scaled cells.
-        return self.analysis.cells.rate()
+        return None if spectrum is None else spectrum.rate
 
     @property
     def floquet_overshoot(self) -> float | None:
         """``sup ||phi(t, s)|| e^{r (t - s)}`` with the exact rate r; None without a period."""
-        analysis, rate = self.analysis, self.floquet_rate
-        if analysis.spectrum is None or rate is None or rate == analysis.spectrum.rate:
-            return analysis.overshoot if analysis.is_periodic else None
-        return analysis.cells.overshoot(rate)
+        return self.analysis.overshoot if self.analysis.is_periodic else None
 
     # --- errors ------------------------------------------------------------------------------------------------------
 
@@ -112,7 +106,7 @@ class Bounds:
 
     @property
     def sampled_slope(self) -> float | None:
-        """``e^{beta h} h k omega (sqrt(d) R + 2 d)``: bounded errors need it below 1 (audit, section 11, 7).
+        """``e^{beta h} h k omega (sqrt(d) R + 2 d)``: bounded errors need it below 1 (audit, section 11.7).
 
         None without a radius R.
         """
@@ -125,7 +119,14 @@ class Bounds:
 
     def _worst(self, decay: float) -> WorstCase | None:
         rate = self.floquet_rate
-        return self.analysis.worst(decay) if rate is None or decay < rate else None
+        if rate is not None and (decay >= rate or self.is_beyond_reach(decay)):
+            return None
+        return self.analysis.worst(decay)
+
+    def is_beyond_reach(self, decay: float) -> bool:
+        """Whether errors of so many earlier cycles count that the exact worst case is not computed."""
+        rate = self.floquet_rate
+        return rate is not None and 0 < (rate - decay) * self.analysis.cycle < _LEAST_FORGOTTEN
 
     def _peaks(self, decay: float) -> tuple[float, NDArray[np.float64]]:
         known: dict[float, tuple[float, NDArray[np.float64]]] = self.__dict__.setdefault("_known_peaks", {})
@@ -317,12 +318,6 @@ class Bounds:
 
     def _part_bound(self, c: float, decay: float) -> ConvergenceBound:
         return self._bound(with_threshold(self.analysis.scenario, c, decay), BoundForm.VALID)
-
-
-def is_lost(analysis: Analysis) -> bool:
-    """Whether a cycle is so long that all Floquet multipliers have lost digits."""
-    spectrum = analysis.spectrum
-    return spectrum is not None and not analysis.is_constant and bool(abs(spectrum.multipliers[0]) < _LOST)
 
 
 def with_threshold(scenario: Scenario, c: float, decay: float) -> Scenario:

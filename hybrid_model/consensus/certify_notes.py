@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
+
 from hybrid_model.consensus.analysis import Analysis
-from hybrid_model.consensus.bounds import Bounds, is_lost, with_threshold
+from hybrid_model.consensus.bounds import Bounds, with_threshold
 from hybrid_model.consensus.corollary import corollary_rate, corollary_rate_exact
 from hybrid_model.consensus.hypotheses import PAPER_LAWS, Hypothesis
 from hybrid_model.consensus.joint_excitation import joint_excitation
 from hybrid_model.consensus.observed import Observation
+from hybrid_model.consensus.report import edge_norm
 from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.trees import tree_radii
 
@@ -28,6 +32,10 @@ def scenario_notes(bounds: Bounds, hypotheses: Sequence[Hypothesis], seen: Obser
     yield from _corollary(bounds.analysis)
     yield from _radius_notes(bounds)
     yield from _refuted(bounds, seen)
+    if seen is not None:
+        counts, states = ", ".join(map(str, seen.events_per_agent)), ", ".join(f"{x:.12f}" for x in seen.x_end)
+        total = sum(seen.events_per_agent)
+        yield f"The run up to {seen.end:.6g} s has {total} events, per agent {counts}, and ends in x = ({states})."
     if seen is not None and seen.radius is not None and seen.initial_share is not None:
         largest = max(bounds.exact_radius or 0.0, seen.radius)
         if bounds.analysis.is_periodic and seen.initial_share > _NEGLIGIBLE * largest:
@@ -84,7 +92,13 @@ def _constants(analysis: Analysis) -> Iterator[str]:
         f"sup int ||M|| = {m.mu2_bar:.7g}; N mu1 = {n.mu1:.7g}, mu2 = {n.mu2:.7g}, sup int ||N|| = {n.mu2_bar:.7g}, "
         f"||int N||_F = {n.frobenius:.7g}."
     )
-    if analysis.spectrum is not None and not is_lost(analysis):
+    scenario = analysis.scenario
+    error = 2 * scenario.trigger.threshold * math.sqrt(scenario.network.agents - 1)
+    yield (
+        f"With this tree rho = {analysis.tree.rho:.7g} and C = 2 c sqrt(p) = {error:.7g}; "
+        f"||x_e(0)|| = {edge_norm(scenario, np.asarray(scenario.network.initial)):.7g}."
+    )
+    if analysis.spectrum is not None and not analysis.spectrum.is_scaled:
         multipliers = ", ".join(f"{abs(value):.6g}" for value in analysis.spectrum.multipliers)
         yield f"Moduli of the Floquet multipliers over {analysis.spectrum.period:.6g} s: {multipliers}."
 
@@ -92,12 +106,26 @@ def _constants(analysis: Analysis) -> Iterator[str]:
 def _accuracy(bounds: Bounds) -> Iterator[str]:
     """How near the exact numbers are to what they stand for."""
     analysis = bounds.analysis
-    if is_lost(analysis) and analysis.spectrum is not None:
+    if analysis.spectrum is not None and analysis.spectrum.is_scaled:
         yield (
-            f"Over the long cycle of {analysis.spectrum.period:.6g} s all Floquet multipliers are below 1e-9; the "
+            f"Over the long cycle of {analysis.spectrum.period:.6g} s all Floquet multipliers are below 1e-5; the "
             "rate is that of a product which is scaled on the way."
         )
-    worst = bounds.exact_worst
+    rate, worst = bounds.floquet_rate, bounds.exact_worst
+    if rate is not None and bounds.slowest and bounds.slowest[0][1] < rate:
+        near = (
+            f"beta = {bounds.slowest[0][1]:.6g}/s is close to the Floquet rate {rate:.6g}/s, measured by the cycle of"
+        )
+        if bounds.is_beyond_reach(bounds.slowest[0][1]):
+            yield (
+                f"The exact radius and the improved gap are not computed: {near} {analysis.cycle:.6g} s, so errors of "
+                "too many earlier cycles count."
+            )
+        if bounds.energy_radius is None:
+            yield (
+                f"The energy bound does not exist: {near} {analysis.cycle:.6g} s, and over no number of cycles that "
+                "was tried does disagreement fall faster than the threshold."
+            )
     if worst is None or not bounds.slowest:
         return
     fewer = ""

@@ -112,9 +112,14 @@ class EdgeWeights:
     def pieces(self, t0: float, t1: float) -> list[Piece]:
         """The interval from `t0` to `t1` [s], cut at the breakpoints."""
         times = [t0, *self.breakpoints(t0, t1).tolist(), t1]
-        carriers = self.carriers
+        carriers, spans = self.carriers, [(a, b) for a, b in pairwise(times) if a < b]
         # The amplitude is taken at the middle, where rounding of a boundary cannot pick the neighbouring segment.
-        return [Piece(a, b, self.amplitudes((a + b) / 2), carriers) for a, b in pairwise(times) if a < b]
+        middles = np.array([(a + b) / 2 for a, b in spans])
+        levels = np.array([waveform.amplitude(middles) for waveform in self.waveforms]).T
+        return [
+            Piece(a, b, level * self.switching.active_at(t), carriers)
+            for (a, b), t, level in zip(spans, middles.tolist(), levels, strict=True)
+        ]
 
     def primitive(self, start: float, end: float) -> "WeightPrimitive":
         """The integrals from `start` [s] as a function that is quick to call, for many times up to `end` [s]."""
@@ -144,18 +149,22 @@ class WeightPrimitive:
     def __init__(self, pieces: list[Piece]) -> None:
         self._cuts = np.array([piece.start for piece in pieces])
         self._amplitudes = np.array([piece.amplitudes for piece in pieces])
-        self._carriers = pieces[0].carriers
+        # Edges that share a carrier need its integral only once.
+        self._carriers = list(dict.fromkeys(pieces[0].carriers))
+        self._which = np.array([self._carriers.index(carrier) for carrier in pieces[0].carriers])
         ends = np.array([piece.end for piece in pieces])
-        parts = [carrier.integral(self._cuts, ends) for carrier in self._carriers]
-        steps = self._amplitudes * np.stack(parts, axis=-1)
+        steps = self._amplitudes * self._spans(self._cuts, ends)
         self._before = np.concatenate((np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)))
 
     def __call__(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Integrals up to `times` [s], shape (s,), within the interval; shape (s, m)."""
         place = np.clip(np.searchsorted(self._cuts, times, side="right") - 1, 0, len(self._amplitudes) - 1)
-        begins = self._cuts[place]
-        inside = np.stack([carrier.integral(begins, times) for carrier in self._carriers], axis=-1)
-        return np.asarray(self._before[place] + self._amplitudes[place] * inside)
+        return np.asarray(self._before[place] + self._amplitudes[place] * self._spans(self._cuts[place], times))
+
+    def _spans(self, begins: NDArray[np.float64], ends: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Integral of each edge's carrier from `begins` to `ends` [s], shape (s, m)."""
+        parts = np.stack([carrier.integral(begins, ends) for carrier in self._carriers], axis=-1)
+        return np.asarray(parts[:, self._which])
 
 
 def _masked_integral(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,10 @@ from hybrid_model.consensus.graphs import disagreement_basis, incidence
 
 __all__ = ["energy_radius", "improved_contraction", "initial_peaks"]
 
-_MULTIPLES = 10
+_DOUBLINGS = 10
+_LARGEST = 600.0
+"""Exponent ``beta T`` that a float still holds."""
+
 _FORGOTTEN = 1e-9
 _MOST_CYCLES = 5000
 
@@ -33,7 +37,13 @@ def energy_radius(analysis: Analysis, decay: float) -> float | None:
     """Bound on ``limsup exp(beta t) ||x_e(t)||`` for the threshold ``exp(-beta t)``; None if it does not exist.
 
     ``edge_gain c_n sqrt(k nubar/2) e^{beta T} sqrt(1 - q)/(1 - e^{beta T} sqrt q)`` with the exact contraction q over
-    T, or ``q = 1 - gamma*`` if the weights have no period. T is the cycle or a multiple that serves better.
+    T, or ``q = 1 - gamma*`` if the weights have no period. T is the cycle or a multiple that serves better: the exact q
+    over many cycles falls at the Floquet rate, however slowly it begins.
+
+    With beta > 0 a long window costs ``e^{beta T}``. There the windows are bounded one by one instead: the j-th one
+    back lets through ``e^{beta (j + 1) T} sqrt(k nubar/2) sup ||phi(t, t - j T)||``, because ``a_j - a_{j+1} <= a_j``.
+    The norms for j that are no power of two are bounded by products, so the sum over j < 2^b is ``prod (1 + x_i)`` over
+    i < b with ``x_i = e^{beta T 2^i} sup ||phi(t, t - 2^i T)||``, and the rest is geometric with the ratio x_b.
 
     Parameters
     ----------
@@ -42,27 +52,36 @@ def energy_radius(analysis: Analysis, decay: float) -> float | None:
     decay : float
         beta [1/s].
     """
-    gain = analysis.scenario.network.gain
-    window, nubar, root = _cycle_constants(analysis)
-    best = math.inf
-    for count in range(_MULTIPLES):
-        multiple = 2**count
-        growth = math.exp(min(decay * window * multiple, 700.0))
-        if growth * root**multiple >= 1:
-            continue
-        # 1 - q from its logarithm: q is close to 1 for short windows.
-        lost = -math.expm1(2 * multiple * math.log(root)) if root > 0 else 1.0
-        best = min(best, math.sqrt(gain * nubar * multiple / 2 * lost) * growth / (1 - growth * root**multiple))
+    window, nubar, contraction = _cycle_constants(analysis)
+    strength, series, best = analysis.scenario.network.gain * nubar / 2, 1.0, math.inf
+    first = contraction(1)
+    for doubling in range(_DOUBLINGS):
+        count = 2**doubling
+        growth = decay * window * count
+        least = math.log(strength * count * (1 - first**2)) / 2 + growth if first < 1 and strength > 0 else -math.inf
+        if growth > _LARGEST or (least >= math.log(best) and series >= best):
+            break
+        root = contraction(count)
+        share = math.exp(growth + math.log(root)) if root > 0 else 0.0
+        if share < 1:
+            # 1 - q from its logarithm: q is close to 1 for short windows.
+            lost = -math.expm1(2 * math.log(root)) if root > 0 else 1.0
+            whole = math.sqrt(strength * count * lost) * math.exp(growth) / (1 - share)
+            # Every window for itself: each of the first `count` by the roots of the powers of two that make it up.
+            single = math.sqrt(strength) * math.exp(decay * window) * series / (1 - share)
+            best = min(best, whole, single)
+        series *= 1 + share
     return analysis.edge_gain * analysis.box_gain * best if math.isfinite(best) else None
 
 
-def _cycle_constants(analysis: Analysis) -> tuple[float, float, float]:
-    """T, ``sup int ||N||`` over T, and the square root of q over T."""
+def _cycle_constants(analysis: Analysis) -> tuple[float, float, Callable[[int], float]]:
+    """T, ``sup int ||N||`` over T, and the square root of q over multiples of T."""
     if not analysis.is_periodic:
-        return analysis.window, analysis.disagreement.mu2_bar, math.sqrt(1 - improved_contraction(analysis))
+        window, root = analysis.window, math.sqrt(1 - improved_contraction(analysis))
+        return window, analysis.disagreement.mu2_bar, lambda count: root**count
     if analysis.is_constant and analysis.spectrum is not None:
-        window = analysis.window
-        return window, analysis.disagreement.mu2_bar, math.exp(-analysis.spectrum.rate * window)
+        window, rate = analysis.window, analysis.spectrum.rate
+        return window, analysis.disagreement.mu2_bar, lambda count: math.exp(-rate * window * count)
     if analysis.window == analysis.cycle:
         return analysis.cycle, analysis.disagreement.mu2_bar, analysis.contraction
     over_cycle = scenario_excitation(analysis.scenario, Signal.DISAGREEMENT, window=analysis.cycle)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid_model.consensus.carriers import UnitCarrier
 from hybrid_model.consensus.edge_weights import EdgeWeights
 from hybrid_model.consensus.graphs import disagreement_basis, incidence
 from hybrid_model.consensus.norm_integral import NormPrimitive
@@ -154,7 +155,7 @@ def excitation_constants(
     length, starts = _windows(weights, window, horizon)
     extremes = _extremes(factor, weights, length, starts)
     norm = NormPrimitive(factor, weights, float(starts[0]), float(starts[-1]) + length)
-    bar = _largest(lambda at: norm(at + length) - norm(at), starts)
+    bar = _largest(lambda at: norm(at + length) - norm(at), starts, refine=not _is_level(weights))
     return ExcitationConstants(window=length, mu2_bar=bar, horizon=_said(weights, horizon), **extremes)
 
 
@@ -174,10 +175,11 @@ def _extremes(
     def integrals(at: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray((factor * (primitive(at + length) - primitive(at))[:, None, :]) @ factor.T)
 
+    refine = not _is_level(weights)
     return {
-        "mu1": max(0.0, -_largest(lambda at: -np.linalg.eigvalsh(integrals(at))[:, 0], starts)),
-        "mu2": _largest(lambda at: np.linalg.eigvalsh(integrals(at))[:, -1], starts),
-        "frobenius": _largest(lambda at: np.linalg.norm(integrals(at), axis=(1, 2)), starts),
+        "mu1": max(0.0, -_largest(lambda at: -np.linalg.eigvalsh(integrals(at))[:, 0], starts, refine=refine)),
+        "mu2": _largest(lambda at: np.linalg.eigvalsh(integrals(at))[:, -1], starts, refine=refine),
+        "frobenius": _largest(lambda at: np.linalg.norm(integrals(at), axis=(1, 2)), starts, refine=refine),
     }
 
 
@@ -221,6 +223,8 @@ def _window_starts(weights: EdgeWeights, last: float, length: float) -> NDArray[
         ([0.0, last], weights.breakpoints(0.0, last), weights.breakpoints(length, length + last) - length)
     )
     corners = np.unique(corners)
+    if _is_level(weights):
+        return corners
     # A cell holds half an oscillation of the fastest carrier at most, and eight steps at least.
     fastest = max(carrier.rate for carrier in weights.carriers)
     counts = np.maximum(np.ceil(np.diff(corners) * fastest / np.pi), 1.0).astype(int) * _POINTS_PER_PIECE
@@ -228,8 +232,13 @@ def _window_starts(weights: EdgeWeights, last: float, length: float) -> NDArray[
     return np.append(np.concatenate(inner), last)
 
 
+def _is_level(weights: EdgeWeights) -> bool:
+    """Whether all weights are constant on pieces: then every extremum lies where a window's end meets a breakpoint."""
+    return all(isinstance(carrier, UnitCarrier) for carrier in weights.carriers)
+
+
 def _largest(
-    function: Callable[[NDArray[np.float64]], NDArray[np.floating[Any]]], starts: NDArray[np.float64]
+    function: Callable[[NDArray[np.float64]], NDArray[np.floating[Any]]], starts: NDArray[np.float64], *, refine: bool
 ) -> float:
     """Supremum of `function` over the range of `starts`: the best peaks of the grid, refined between their neighbours.
 
@@ -237,7 +246,7 @@ def _largest(
     """
     values = np.asarray(function(starts), dtype=float)
     best = float(values.max())
-    if len(starts) == 1:
+    if len(starts) == 1 or not refine:
         return best
     padded = np.concatenate(([-np.inf], values, [-np.inf]))
     peaks = np.flatnonzero((values >= padded[:-2]) & (values >= padded[2:]))

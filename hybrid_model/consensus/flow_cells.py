@@ -50,31 +50,24 @@ class FlowCells:
             flow = cell @ flow
         return flow
 
-    def rate(self) -> float:
-        """``-ln(max |multiplier|)`` over the interval, per second: the Floquet rate if it is a period.
+    def contraction(self, periods: int = 1) -> float:
+        """Largest ``||phi(t + m P, t)||`` over the ends t of the cells of one period P, for m periods."""
+        before, after, whole = self._halves
+        inner = after if periods == 1 else np.linalg.matrix_power(whole, periods - 1) @ after
+        return float(np.max(np.linalg.norm(before @ inner, 2, axis=(1, 2))))
 
-        The product is scaled on the way, so that a multiplier far below the smallest float keeps its digits.
-        """
-        flow, logarithm = np.eye(self.flows.shape[1]), 0.0
-        for cell in self.flows:
-            flow = cell @ flow
-            size = float(np.max(np.abs(flow)))
-            if size < 1e-100:
-                flow, logarithm = flow / size, logarithm + np.log(size)
-        largest = float(np.max(np.abs(np.linalg.eigvals(flow))))
-        return -(float(np.log(largest)) + logarithm) / float(self.times[-1] - self.times[0])
-
-    def contraction(self) -> float:
-        """Largest ``||phi(t + P, t)||`` over the ends t of the cells of one period P."""
+    @cached_property
+    def _halves(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Flows from the start of the period to each cell, from each cell to the end, and over all of it."""
         size, count = self.flows.shape[1], len(self.flows)
         before, after = np.empty((count, size, size)), np.empty((count, size, size))
         flow = np.eye(size)
         for j in range(count):
             before[j], flow = flow, self.flows[j] @ flow
-        flow = np.eye(size)
+        whole, flow = flow, np.eye(size)
         for j in range(count - 1, -1, -1):
             flow = after[j] = flow @ self.flows[j]
-        return float(np.max(np.linalg.norm(before @ after, 2, axis=(1, 2))))
+        return before, after, whole
 
     def overshoot(self, rate: float) -> float:
         """``sup ||phi(t, s)|| exp(rate (t - s))`` over starts s in the period and two periods after each.

@@ -140,7 +140,7 @@ def bound_hypotheses(bounds: Bounds) -> list[Hypothesis]:
     ]
     reason = _unbounded(bounds)
     if reason is not None:
-        found.append(Hypothesis("bounded errors", False, reason, "audit, section 11, 7"))
+        found.append(Hypothesis("bounded errors", False, reason, "audit, section 11.7"))
     for form, rate in rates.items():
         found.append(
             Hypothesis(

@@ -37,11 +37,20 @@ class Observation:
         consensus, or a bound on the errors.
     initial_share : float or None
         Largest ``exp(beta t) ||x_e(t) without errors||`` over the last cycle.
+    end : float
+        Where the run ends [s].
+    events_per_agent : tuple of int
+        Broadcasts of each agent, without the one at the start.
+    x_end : tuple of float
+        Final states.
     """
 
     min_gap: float | None
     radius: float | None
     initial_share: float | None
+    end: float
+    events_per_agent: tuple[int, ...]
+    x_end: tuple[float, ...]
 
 
 def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observation:
@@ -57,20 +66,18 @@ def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observat
         beta [1/s] of the slowest part of the bound on the errors; None if there is no bound, and then no radius.
     """
     scenario = analysis.scenario
-    gap = run_report(scenario, arc).min_gap
+    report = run_report(scenario, arc)
+    gap, shown = report.min_gap, (float(arc.t[-1]), tuple(report.events_per_agent), tuple(report.x_end.tolist()))
     times, free = undisturbed(analysis, float(arc.t[-1]))
     shortest = None if gap is None else _shortest(scenario, gap)
     if decay is None:
-        return Observation(min_gap=shortest, radius=None, initial_share=None)
+        return Observation(shortest, None, None, *shown)
     names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
     states = np.array([arc.at(name, times) for name in names])
     growth = np.exp(decay * times)
     share = edge_norm(scenario, free) * growth
-    return Observation(
-        min_gap=shortest,
-        radius=max(0.0, float(np.max(edge_norm(scenario, states) * growth - share))),
-        initial_share=float(np.max(share)),
-    )
+    forced = max(0.0, float(np.max(edge_norm(scenario, states) * growth - share)))
+    return Observation(shortest, forced, float(np.max(share)), *shown)
 
 
 def _shortest(scenario: Scenario, gap: float) -> float:

@@ -230,11 +230,11 @@ class ReachableSets:
             found.append(np.arange(a, b, max(1, least, min(step, (b - a) // points))))
         return np.unique(np.concatenate(found)).astype(np.intp)
 
-    def contraction(self) -> float:
-        """Largest ``||phi(t + P, t)||`` over the grid of times; a bound on it for all times if the grid is coarser."""
+    def contraction(self, periods: int = 1) -> float:
+        """Largest ``||phi(t + m P, t)||``, m periods, over the grid of times; a bound on it if the grid is coarser."""
         # Within a cell the norm rises above its values at the ends by a share of the second order.
         cover = 1 + self.resolution**2 if self.is_coarser else 1.0
-        return min(1.0, cover * self._cells.contraction())
+        return min(1.0, cover * self._cells.contraction(periods))
 
     def overshoot(self, rate: float) -> float:
         """Largest ``||phi(t, s)|| exp(rate (t - s))``, see `FlowCells.overshoot`."""

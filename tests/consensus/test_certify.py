@@ -86,6 +86,25 @@ class TestPublishedNumbersOfScenarioA:
         for number in ("0.0525799", "0.0262069", "0.000292459"):
             assert number in text
 
+    @pytest.mark.parametrize("name", ["paper-a-static", "paper-a"])
+    def test_factors_of_the_tree_and_the_start(self, paper, name):
+        notes = " ".join(paper[name].notes)
+        assert "rho = 2.613126 and C = 2 c sqrt(p) = 1.732051; ||x_e(0)|| = 2.703701." in notes
+
+    @pytest.mark.parametrize(
+        ("name", "counts", "end"),
+        [
+            ("paper-a-static", "25 events, per agent 2, 6, 13, 4", (0.817749136204, 0.809163584777, 1.078555901778)),
+            ("paper-a", "35 events, per agent 4, 10, 13, 8", (0.927800406772, 0.932060314225, 0.915459109314)),
+        ],
+    )
+    def test_the_run(self, paper, name, counts, end):
+        note = next(note for note in paper[name].notes if note.startswith("The run up to 50 s"))
+        assert counts in note
+        states = [float(number) for number in note[note.index("(") + 1 : note.index(")")].split(",")]
+        assert states[:3] == pytest.approx(end, abs=1e-10)  # as the audit says of states
+        assert sum(states) == pytest.approx(3.7, abs=1e-10)
+
     def test_radius_and_gap_with_the_static_trigger(self, paper):
         found = paper["paper-a-static"].as_dict()
         assert found["radius"]["exact"] == pytest.approx(2.26459, abs=5e-6)
