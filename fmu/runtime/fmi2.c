@@ -177,7 +177,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean noSetFMUStat
     (void)noSetFMUStatePriorToCurrentPoint;
     Answer answer = instance_completed_step(c, __func__, enterEventMode ? &event : NULL,
                                             terminateSimulation ? &end : NULL);
-    if (answer == ANSWER_OK) {
+    if (answer == ANSWER_OK && enterEventMode && terminateSimulation) {
         *enterEventMode = event;
         *terminateSimulation = end;
     }
