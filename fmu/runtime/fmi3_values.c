@@ -89,7 +89,7 @@ fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReferenc
     Qualifier qualifier = INTERVAL_NOT_YET_KNOWN;
     Answer answer = instance_get_interval(instance, __func__, valueReferences, nValueReferences,
                                           qualifiers ? intervals : NULL, &interval, &qualifier);
-    for (size_t i = 0; answer == ANSWER_OK && i < nValueReferences; i++) {
+    for (size_t i = 0; answer == ANSWER_OK && qualifiers && i < nValueReferences; i++) {
         intervals[i] = interval;
         qualifiers[i] = (fmi3IntervalQualifier)qualifier;
     }
