@@ -158,15 +158,22 @@ bool engine_arrive(Engine *engine)
 bool engine_may_flow(Engine *engine)
 {
     const Point *live = &engine->live;
-    double margin, level;
+    double margin, later, soon = *live->time + fmax(LEAVING_TIME, event_tolerance(*live->time));
     if (engine->status->ending != ENDED_NOT)
         return false;
     if (!engine->model->has_flow_set)
         return true;
     if (!evaluate_flow_set(engine, *live->time, live->x, live->z, &margin))
         return end_run(engine);
-    return margin >= -EVENT_TOLERANCE || (step_begin(engine, live) && flow_may_begin(engine, live, &level)) ||
-           end_run(engine);
+    if (margin >= -EVENT_TOLERANCE)
+        return true;
+    if (!step_begin(engine, live) || !step_probe(engine, live, soon) ||
+        !evaluate_flow_set(engine, soon, engine->probe_x, live->z, &later))
+        return end_run(engine);
+    if (later >= margin - LEAVING_RATE * LEAVING_TIME)
+        return true;
+    blocked(engine, *live->time, live->x, live->z, margin);
+    return end_run(engine);
 }
 
 /* Whether a breakpoint is due at the live point or comes up to `target`; the times must be there. */

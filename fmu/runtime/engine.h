@@ -115,7 +115,8 @@ bool engine_next_time_event(Engine *engine, bool breakpoints, double *event_time
 /* An importer that integrates by itself says that it has come to an event: guards that it stopped short of
    by less than the event tolerance are enabled, and a time event that it missed by a rounding is due. */
 bool engine_arrive(Engine *engine);
-/* Whether that importer may go on: the state is in the flow set; otherwise the run is over. */
+/* Whether that importer may go on: false, and the run is over, where the flow leads further out of the flow set.  One
+   that has gone too far, or came out by a jump, may find its way back. */
 bool engine_may_flow(Engine *engine);
 
 /* Clocks that ticked since engine_clear_ticks; engine_advance clears them when it begins. */

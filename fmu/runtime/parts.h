@@ -22,6 +22,9 @@
 #define RELATIVE_TOLERANCE 1e-13
 #define RELATIVE_TOLERANCE_MOST 1e-10
 #define ABSOLUTE_TOLERANCE 1e-15
+/* A flow leaves the flow set if its margin falls faster than this (1/s) over that time (s): more than roundings do. */
+#define LEAVING_RATE 1e-6
+#define LEAVING_TIME 1e-6
 #define LOOK_AHEAD_STEPS 20000
 #define LOOK_AHEAD_TIME 1e6
 #define ADVANCE_STEPS 1000000
@@ -184,6 +187,8 @@ bool evaluate_margins(Engine *engine, double t, const double *x, const double *z
 bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin);
 /* Whether the point may flow as far as the flow set says; *level is the margin to be kept. */
 bool flow_may_begin(Engine *engine, const Point *point, double *level);
+/* Notes that the state can neither flow nor jump; always false. */
+bool blocked(Engine *engine, double t, const double *x, const double *z, double margin);
 
 /* locate.c */
 /* Looks for the first event on the present step; FLOW_EVENT moves the point there. */

@@ -53,10 +53,6 @@ bool first_guard(Search *search, double *t);
 /* The time at which the flow set is left, if the step leaves it by more than the tolerance. */
 bool first_exit(Search *search, double *t);
 
-/* sets.c */
-/* Notes that the state can neither flow nor jump; always false. */
-bool blocked(Engine *engine, double t, const double *x, const double *z, double margin);
-
 /* rises.c */
 /* The time of a sample of the piece from a to b. */
 double sample_time(double a, double b, size_t i);

@@ -233,6 +233,18 @@ def test_a_run_that_leaves_the_flow_set_ends(fmi, make):
 
 
 @VERSIONS
+def test_a_state_outside_that_is_on_its_way_back_may_flow(fmi, make):
+    """Importers that locate events roughly go too far; after the jump the ball is below the floor, and rises."""
+    component = make("ball", fmi)
+    component.begin()
+    for height, velocity in ((-1e-3, 2.0), (-1e-3, 0.0), (0.2, -1.0), (-1e-3, -2.0)):
+        component.do("SetContinuousStates", doubles([height, velocity]), c.c_size_t(2))
+        assert component.completed() == (OK, velocity <= 0.0 and height <= 0.0, False)
+    assert component.errors == []
+    component.free()
+
+
+@VERSIONS
 def test_a_trigger_that_fires_for_ever_ends_the_run(fmi, make):
     component = make("agreed", fmi)
     record = Exchange(component).run([0.0, 1.0], component.begin())
