@@ -240,6 +240,13 @@ class Bounds:
         return self._improved_part_gap(sum(c for c, _ in parts), 0.0, with_initial=True, threshold=last)
 
     def _least_gap(self, part: _PartGap) -> float | None:
+        trigger, gap = self.analysis.scenario.trigger, self._threshold_gap(part)
+        if trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC):
+            # Whatever the errors do, broadcasts are at multiples of the period.
+            return max(gap or 0.0, trigger.period)
+        return gap
+
+    def _threshold_gap(self, part: _PartGap) -> float | None:
         parts = self.parts
         if not parts:
             return None
@@ -257,8 +264,6 @@ class Bounds:
             if gap is None:
                 return None
             least = min(least, gap)
-        if trigger.kind is TriggerKind.SAMPLED:
-            least = max(least, trigger.period)
         return least if math.isfinite(least) else None
 
     def _valid_part_gap(

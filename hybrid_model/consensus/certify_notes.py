@@ -16,6 +16,7 @@ from hybrid_model.consensus.observed import Observation
 from hybrid_model.consensus.report import edge_norm
 from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.trees import tree_radii
+from hybrid_model.consensus.trigger_data import TriggerKind
 
 __all__ = ["scenario_notes"]
 
@@ -79,7 +80,9 @@ def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
     if name == "beta below the improved rate":
         return "The energy bound does not exist; the exact radius and the gap hold for the run up to the stop time."
     if name == "bounded errors":
-        return "Only the rate of the network without errors is certified."
+        timed = scenario.trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC)
+        also = " and the period, as a gap," if timed else ""
+        return f"Only the rate of the network without errors{also} {'are' if timed else 'is'} certified."
     return ""
 
 

@@ -150,7 +150,8 @@ def joint_excitation(scenario: Scenario) -> JointExcitation:
     Notes
     -----
     Without a common period of weights and switching, the intervals are those that end within the run, and `exact` holds
-    for the windows inside it.
+    for the windows inside it. If so much of the run is left over that a window could lie in it without a whole
+    interval, the last interval lasts until the end of the run.
     """
     weights, network = scenario.edge_weights, scenario.network
     instants, period = _instants(scenario)
@@ -168,6 +169,8 @@ def joint_excitation(scenario: Scenario) -> JointExcitation:
             "the union of the graphs over the whole run is not connected, so there are no jointly connected intervals; "
             "let each agent be reached within the run."
         )
+    if period is None:
+        intervals[-1] = _to_the_end(scenario, intervals)
     window = 2 * max(interval.length for interval in intervals)
     horizon = excitation_horizon(scenario)
     if horizon is not None:
@@ -179,6 +182,12 @@ def joint_excitation(scenario: Scenario) -> JointExcitation:
         trace=window_extremes(total, weights, window, horizon).mu2,
         agents=network.agents,
     )
+
+
+def _to_the_end(scenario: Scenario, intervals: list[JointInterval]) -> JointInterval:
+    """The last interval, made longer if windows behind its start would hold no whole interval."""
+    last, longest, end = intervals[-1], max(interval.length for interval in intervals), scenario.stop_time
+    return _interval(scenario, last.start, end) if end - last.start > 2 * longest else last
 
 
 def tree_excitations(

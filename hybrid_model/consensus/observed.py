@@ -17,6 +17,9 @@ from hybrid_model.consensus.trigger_data import TriggerKind
 
 __all__ = ["TIME_TOLERANCE", "Observation", "observe"]
 
+_STATE_TOLERANCE = 1e-10
+"""States of a run are trusted to this, measured by the disagreement at the start (audit, section 10)."""
+
 TIME_TOLERANCE = 1e-8
 """Event times [s] are ill-conditioned where a weight is near zero; they are trusted to this (audit, section 10)."""
 
@@ -29,12 +32,12 @@ class Observation:
     ----------
     min_gap : float or None
         Shortest time [s] between two broadcasts of one agent; None if no agent broadcast twice. It is less the
-        numerical tolerance of two event times, but for sampled checks: those are at known times, so there it is the
-        whole number of periods that it stands for.
+        numerical tolerance of two event times, but for sampled checks and periodic broadcasts: those are at known
+        times, so there it is the whole number of periods that it stands for.
     radius : float or None
         Largest ``exp(beta t) (||x_e(t)|| - ||x_e(t) without errors||)`` over the last cycle: what is left once the
-        share of the initial state is taken off. Never above the exact worst case. None without a network that reaches
-        consensus, or a bound on the errors.
+        share of the initial state and the numerical tolerance of states are taken off. Never above the exact worst
+        case. None without a network that reaches consensus, or a bound on the errors.
     initial_share : float or None
         Largest ``exp(beta t) ||x_e(t) without errors||`` over the last cycle.
     end : float
@@ -76,12 +79,13 @@ def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observat
     states = np.array([arc.at(name, times) for name in names])
     growth = np.exp(decay * times)
     share = edge_norm(scenario, free) * growth
-    forced = max(0.0, float(np.max(edge_norm(scenario, states) * growth - share)))
+    rounding = _STATE_TOLERANCE * edge_norm(scenario, np.asarray(scenario.network.initial)) * growth
+    forced = max(0.0, float(np.max(edge_norm(scenario, states) * growth - share - rounding)))
     return Observation(shortest, forced, float(np.max(share)), *shown)
 
 
 def _shortest(scenario: Scenario, gap: float) -> float:
-    if scenario.trigger.kind is TriggerKind.SAMPLED and scenario.channel.ideal:
+    if scenario.trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC):
         return round(gap / scenario.trigger.period) * scenario.trigger.period
     return gap - 2 * TIME_TOLERANCE
 

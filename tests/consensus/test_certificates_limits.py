@@ -8,13 +8,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+import hybrid_model as hm
+from fmu.compiled import compiled
 from hybrid_model.consensus.analysis import analyse
 from hybrid_model.consensus.bounds import Bounds
 from hybrid_model.consensus.certify import certify
+from hybrid_model.consensus.corollary import corollary_rate, corollary_rate_exact
 from hybrid_model.consensus.energy import energy_radius
 from hybrid_model.consensus.excitation import Signal, signal_factor, window_extremes
 from hybrid_model.consensus.floquet import floquet_spectrum
 from hybrid_model.consensus.graphs import complete_edges, disagreement_basis, incidence
+from hybrid_model.consensus.joint_excitation import joint_excitation
+from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.scenario import load_scenario, read_scenario
 from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
 
@@ -23,16 +28,14 @@ PATH_RATE = 2 - math.sqrt(2)
 
 
 def network(edges, agents, weights, **further):
-    return read_scenario(
-        {
-            "name": "limits",
-            "stop_time": 30.0,
-            "network": {"agents": agents, "edges": edges, "initial": [float(i) for i in range(agents)]},
-            "weights": weights,
-            "trigger": {"kind": "static", "threshold": 0.1},
-            **further,
-        }
-    )
+    base = {
+        "name": "limits",
+        "stop_time": 30.0,
+        "network": {"agents": agents, "edges": edges, "initial": [float(i) for i in range(agents)]},
+        "weights": weights,
+        "trigger": {"kind": "static", "threshold": 0.1},
+    }
+    return read_scenario({**base, **further})
 
 
 def slow_path(rate, phase):
@@ -125,6 +128,41 @@ class TestBetaCloseToTheRate:
         assert found.value("radius", "exact") is None
         assert 0.28 < found.value("radius", "energy") < found.value("radius", "improved")
         assert "too many earlier cycles count" in " ".join(found.notes)
+
+
+SINES = {"kind": "sine", "mean": 1.0, "depth": 0.9, "rate": 2.0, "phase": [0.0, 1.0, 2.0]}
+LINE = [[1, 2], [2, 3], [3, 4]]
+
+
+class TestWhatRemains:
+    """Hypotheses fail, and what the certificates still say is true of a run."""
+
+    @pytest.mark.parametrize(
+        ("trigger", "gap"),
+        [({"kind": "sampled", "threshold": 0.1, "period": 0.9}, 0.9), ({"kind": "periodic", "period": 0.2}, 0.2)],
+    )
+    def test_broadcasts_at_known_times_are_a_period_apart(self, trigger, gap):
+        scenario = network(LINE, 4, SINES, trigger=trigger)
+        arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+        found = certify(scenario, arc, resolution=0.1)
+        assert found.value("radius", "exact") is None
+        assert found.value("min_gap", "improved") == gap <= found.value("min_gap", "observed")
+        assert "and the period, as a gap, are certified" in " ".join(found.notes)
+
+    def test_without_trigger_errors_nothing_is_left(self):
+        scenario = network(LINE, 4, SINES, trigger={"kind": "continuous"})
+        arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+        found = certify(scenario, arc, resolution=0.1)
+        assert found.value("radius", "observed") == found.value("radius", "exact") == 0.0
+
+    def test_an_edge_that_is_switched_off_for_ever(self):
+        """The only jointly connected interval then lasts until the end: no window behind it holds another one."""
+        switching = {"kind": "sequence", "dwell": [2.0, 28.0], "active": [[1, 2], [1]]}
+        scenario = network([[1, 2], [2, 3]], 3, {"kind": "constant", "value": 1.0}, switching=switching)
+        joint = joint_excitation(scenario)
+        assert [(interval.start, interval.end) for interval in joint.intervals] == [(0.0, 30.0)]
+        assert 0 < joint.mu1_of_paths <= joint.mu1_of_trees <= joint.mu1_of_intervals <= joint.exact.mu1 * (1 + 1e-12)
+        assert corollary_rate(joint, 1.0) <= corollary_rate_exact(joint, 1.0)
 
 
 def test_what_one_analysis_finds_the_other_knows():
