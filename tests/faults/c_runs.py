@@ -1,5 +1,6 @@
 """Runs of a model in the C harness, by Co-Simulation and by Model Exchange, and the Python run that they must equal."""
 
+import itertools
 import re
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -104,7 +105,7 @@ def co_simulation(harness, witness, *, slot=0, events=True, early=True, update=0
     if events:
         instance.iterate()
     set_all(instance, witness, 0.0)
-    for t, point in zip(points, points[1:], strict=False):
+    for t, point in itertools.pairwise(points):
         step_to(instance, t, point, events)
         seen.samples[point] = sample(instance, names)
         if set_all(instance, witness, point, events):

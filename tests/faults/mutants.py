@@ -1,6 +1,6 @@
 """Faults put into the runtime by hand: each a text that is replaced by another one, and what it breaks.
 
-The text must be there once.  `kind` names the check that is asked first; all others follow if it does not see the fault.
+The text must be there once.  `first` names the check that is asked first; the others follow if it sees nothing.
 """
 
 from dataclasses import dataclass
@@ -634,7 +634,8 @@ MUTANTS += [
         "steps allocate",
         "stepping.c",
         "    Advance advance = engine_advance(",
-        "    extern void *malloc(size_t);\n    extern void free(void *);\n    void *volatile waste = malloc(8);\n    free(waste);\n"
+        "    extern void *malloc(size_t);\n    extern void free(void *);\n"
+        "    void *volatile waste = malloc(8);\n    free(waste);\n"
         "    Advance advance = engine_advance(",
         "nothing is allocated in a step",
         "check_step_arguments",

@@ -157,7 +157,7 @@ def test_errors_are_logged_and_events_where_wanted(logging, fmi, started):
     assert len(instance.log()) == (1 if logging else 0)
     assert instance.call("step", 0.0, 1.0)[0] == 3
     assert len(instance.log()) == 1
-    instance.do("debug", 1, "logStatusError".encode().hex())
+    instance.do("debug", 1, b"logStatusError".hex())
     instance.step(1.0, 0.5)
     assert instance.log() == []
     instance.do("debug", 1, "-")
