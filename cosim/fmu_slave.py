@@ -6,11 +6,10 @@ import math
 import shutil
 import tempfile
 import weakref
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 
@@ -18,19 +17,12 @@ from cosim.errors import CosimError
 from cosim.fmi2_instance import Fmi2Instance
 from cosim.fmi3_instance import Fmi3Instance
 from cosim.fmu_instance import FmuInstance
-from cosim.slave import Port, Slave, Step, Termination, Update
+from cosim.fmu_variables import INTEGERS, NUMBERS, elements, ports, size
+from cosim.slave import Slave, Step, Termination, Update
 from fmu.check.archive import Archive
 
 MAX_PARTS = 10_000
 """Most early returns within one communication step of a master that handles no events."""
-
-_INTEGERS = {
-    "Integer",
-    "Boolean",
-    "Enumeration",
-    *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)),
-}
-_NUMBERS = {"Real", "Float32", "Float64", *_INTEGERS}
 
 
 class FmuSlave(Slave):
@@ -66,8 +58,8 @@ class FmuSlave(Slave):
                 f"{_interfaces(description)}): export it as one."
             )
         self._variables = {variable.name: variable for variable in description.modelVariables}
-        numbers = [variable for variable in description.modelVariables if variable.type in _NUMBERS]
-        self._elements = {name: place for variable in numbers for name, place in _elements(variable)}
+        numbers = [variable for variable in description.modelVariables if variable.type in NUMBERS]
+        self._elements = {name: place for variable in numbers for name, place in elements(variable)}
         self._clock_references = {
             variable.name: variable.valueReference
             for variable in description.modelVariables
@@ -75,8 +67,8 @@ class FmuSlave(Slave):
         }
         super().__init__(
             name,
-            [port for variable in numbers if variable.causality == "input" for port in _ports(variable)],
-            [port for variable in numbers if variable.causality == "output" for port in _ports(variable)],
+            [port for variable in numbers if variable.causality == "input" for port in ports(variable)],
+            [port for variable in numbers if variable.causality == "output" for port in ports(variable)],
             list(self._clock_references),
         )
         self.has_event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
@@ -114,7 +106,7 @@ class FmuSlave(Slave):
                 raise self.unknown(name)
             whole, index = self._elements[name]
             variable = self._variables[whole]
-            self._getters[name] = *self._instance.getter(variable, _size(variable)), index
+            self._getters[name] = *self._instance.getter(variable, size(variable)), index
         getter, arguments, index = self._getters[name]
         return float(self._call(getter, *arguments)[index])
 
@@ -212,10 +204,10 @@ class FmuSlave(Slave):
     def _write(self, name: str, value: float) -> None:
         whole, index = self._elements[name]
         variable = self._variables[whole]
-        number = round(value) if variable.type in _INTEGERS else float(value)
+        number = round(value) if variable.type in INTEGERS else float(value)
         values = [number]
-        if _size(variable) > 1:
-            getter, arguments = self._instance.getter(variable, _size(variable))
+        if size(variable) > 1:
+            getter, arguments = self._instance.getter(variable, size(variable))
             values = list(self._call(getter, *arguments))
             values[index] = number
         self._call(self._instance.set, variable, values)
@@ -248,22 +240,3 @@ def _interfaces(description: Any) -> str:
 def _unload(fmu: Any, folder: str) -> None:
     fmu.freeLibrary()
     shutil.rmtree(folder, ignore_errors=True)
-
-
-def _elements(variable: Any) -> Iterator[tuple[str, tuple[str, int]]]:
-    """Yield the scalars of a variable, counted from 1 row by row, with the place of each."""
-    if not variable.dimensions:
-        yield variable.name, (variable.name, 0)
-        return
-    for index, place in enumerate(np.ndindex(*variable.shape)):
-        yield f"{variable.name}[{','.join(str(i + 1) for i in place)}]", (variable.name, index)
-
-
-def _size(variable: Any) -> int:
-    return int(np.prod(variable.shape)) if variable.dimensions else 1
-
-
-def _ports(variable: Any) -> list[Port]:
-    # FMI has no integer and no Boolean that changes along flows.
-    discrete = variable.variability == "discrete" or variable.type in _INTEGERS
-    return [Port(name, variable.unit or "", discrete) for name, _ in _elements(variable)]
