@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -214,12 +214,12 @@ class _Watch:
         self._panels = math.ceil(execution.solver.scan_points / DEGREE)
         self._guards = execution.guards
         rows = range(self._guards + automaton.has_flow_set)
-        # Under flow priority only the exit counts, and it counts at once; else, and for a state that rounding has put
-        # outside already, it counts beyond the tolerance.
-        flow_first = automaton.priority is Priority.FLOW
-        self._watched = rows[self._guards :] if flow_first else rows
+        # Under flow priority only the exit counts, and it counts at once; else, and while a state is outside where
+        # rounding has put it, it counts beyond the tolerance.
+        self._flow_first = automaton.priority is Priority.FLOW
+        self._watched = rows[self._guards :] if self._flow_first else rows
         self._beyond: tuple[FlowPiece, FloatArray] | None = None
-        self._slack = FLOW_FIRST_SLACK if flow_first and execution.in_flow_set(0.0) else self._tolerance
+        self._slack = self._tolerance
 
     def state(self, piece: FlowPiece, t: float) -> FloatArray:
         """Return the continuous states in a piece, or less than the tolerance after it.
@@ -244,11 +244,25 @@ class _Watch:
         if not self._watched:
             return None
         for a, b in itertools.pairwise(np.linspace(piece.t0, piece.t1, self._panels + 1)):
-            found = self._first_in_panel(piece, float(a), float(b))
-            if found is not None:
-                t, row = found
-                return self._latest_of_simultaneous(piece, t, end), row >= self._guards
+            for start, stop in self._parts(piece, float(a), float(b)):
+                found = self._first_in_panel(piece, start, stop)
+                if found is not None:
+                    t, row = found
+                    return self._latest_of_simultaneous(piece, t, end), row >= self._guards
         return None
+
+    def _parts(self, piece: FlowPiece, a: float, b: float) -> Iterator[tuple[float, float]]:
+        """Yield a panel; under flow priority cut where a state that began outside by rounding is seen inside."""
+        if self._flow_first and self._slack == self._tolerance:
+            times = scan_times(a, b)
+            inside = np.flatnonzero(self._execution.margins_along(times, piece.sample(times))[:, -1] >= 0.0)
+            if inside.size:
+                seen = float(times[inside[0]])
+                if seen > a:
+                    yield a, seen
+                self._slack, a = FLOW_FIRST_SLACK, seen
+        if b > a:
+            yield a, b
 
     def _first_in_panel(self, piece: FlowPiece, a: float, b: float) -> tuple[float, int] | None:
         times = scan_times(a, b)

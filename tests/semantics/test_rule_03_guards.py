@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 from small_automata import Alarm, Corridor, PatientCorridor, Ramp, Timer
 
 import hybrid_model as hm
@@ -118,6 +119,37 @@ def test_under_flow_priority_rounding_at_the_border_of_a_large_set_does_not_bloc
             return (1e6 - s.x**2 - s.y**2) / 1e3
 
     assert hm.simulate(Circle(), 1.0, solver=hm.Solver(event_tolerance=1e-6)).stop is hm.Stop.HORIZON
+
+
+class ToAndFro(hm.HybridAutomaton):
+    """Turns where it would leave its flow set, also where rounding has put it just outside."""
+
+    priority = hm.Priority.FLOW
+    x = hm.State(0.0, output=True)
+    direction = hm.DiscreteState(1.0)
+
+    def flow_map(self, s):
+        return {"x": s.direction * (1.0 + 0.2 * np.cos(s.t))}
+
+    def flow_set(self, s):
+        return 1.0 - np.abs(s.x)
+
+    def jump_set(self, s):
+        return np.abs(s.x) - 0.5
+
+    def jump_map(self, s):
+        return {"direction": -s.direction}
+
+
+@pytest.mark.parametrize("start", [0.0, -1.0, 1.0 - 1e-16, -1.0 + 3e-16, -1.0 - 3e-10])
+def test_a_flow_that_begins_outside_by_rounding_ends_where_it_leaves_the_flow_set(start):
+    """The way t + 0.2 sin(t) is a whole number of turns."""
+    arc = hm.simulate(ToAndFro(x=start), 12.0)
+    ways = np.array([1.0 - start + 2.0 * k for k in range(6)])
+    times = [brentq(lambda t, way=way: t + 0.2 * np.sin(t) - way, -1.0, 15.0, xtol=1e-15) for way in ways]
+    times = [t for t in times if 1e-9 < t < 12.0]
+    assert [jump.t for jump in arc.jumps if jump.t > 1e-9] == pytest.approx(times, abs=2e-9)
+    assert np.abs(arc["x"]).max() < 1.0 + 1e-9
 
 
 def test_the_tolerance_is_in_the_result():

@@ -84,7 +84,7 @@ EDITS_3 = [
 
 
 @pytest.mark.parametrize(
-    ("edits", "rules"), EDITS_3, ids=lambda value: "" if isinstance(value, list) else "+".join(value)
+    ("edits", "rules"), EDITS_3, ids=lambda value: "" if isinstance(value, list) else "+".join(sorted(value))
 )
 def test_fmi_3_descriptions(edits, rules, tmp_path):
     assert wrong(check(tmp_path, edited(DESCRIPTIONS[3], *edits))) == rules
@@ -106,7 +106,7 @@ EDITS_2 = [
 
 
 @pytest.mark.parametrize(
-    ("edits", "rules"), EDITS_2, ids=lambda value: "" if isinstance(value, list) else "+".join(value)
+    ("edits", "rules"), EDITS_2, ids=lambda value: "" if isinstance(value, list) else "+".join(sorted(value))
 )
 def test_fmi_2_descriptions(edits, rules, tmp_path):
     assert wrong(check(tmp_path, edited(DESCRIPTIONS[2], *edits))) == rules
