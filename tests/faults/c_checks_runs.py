@@ -298,6 +298,7 @@ def check_times_announced(start):
         exchange = Exchange(start(gated, fmi), WITNESSES["gated"])
         exchange.instance.boot()
         exchange.settle()
+        assert exchange.next is not None
         assert abs(exchange.next - first) < 1e-15
 
 

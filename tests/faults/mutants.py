@@ -237,7 +237,12 @@ MUTANTS = [
         "check_co_simulation",
     ),
     Mutant(
-        "coarse steps", "integrate.c", "if (error <= 1.0) {", "if (error <= 1e9) {", "the flow", "check_co_simulation"
+        "coarse steps",
+        "integrate.c",
+        "engine->status->absolute_tolerance + engine->status->relative_tolerance * size;",
+        "engine->status->absolute_tolerance + 1e8 * engine->status->relative_tolerance * size;",
+        "the flow",
+        "check_co_simulation",
     ),
     Mutant(
         "the last stage is forgotten",
