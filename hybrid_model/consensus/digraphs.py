@@ -184,7 +184,9 @@ class BalancedSwitching:
         """What every window of one period does at least; the integrals over a period do not depend on its start."""
         total = sum(dwell * symmetric_part(A) for A, dwell in zip(self.adjacencies, self.dwells, strict=True))
         degrees = [float(np.max(np.diag(directed_laplacian(A)))) for A in self.adjacencies]
-        mu1 = max(0.0, float(np.linalg.eigvalsh(total)[0]))
+        eigenvalues = np.linalg.eigvalsh(total)
+        # What rounding leaves of a union that does not join all agents is no excitation.
+        mu1 = float(eigenvalues[0]) if eigenvalues[0] > _BALANCE * eigenvalues[-1] else 0.0
         dbar = sum(d * dwell for d, dwell in zip(degrees, self.dwells, strict=True))
         return directed_contraction(mu1, float(np.trace(total)), dbar, self.gain, self.period)
 

@@ -46,7 +46,7 @@ def drawn(seed, **options):
     return random_scenario(seed, kind, channel=channel, **options)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(seed=SEEDS)
 def test_a_run_over_a_channel_is_the_exact_one(seed):
     scenario = drawn(seed)
@@ -56,7 +56,7 @@ def test_a_run_over_a_channel_is_the_exact_one(seed):
     assert lost == exact.lost
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(seed=SEEDS)
 def test_agents_that_meet_at_events_only_run_the_same(seed):
     scenario = drawn(seed, stop_time=2.0)

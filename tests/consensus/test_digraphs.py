@@ -120,3 +120,13 @@ def test_without_excitation_nothing_is_promised():
 def test_wrong_data_are_named(call, message):
     with pytest.raises(ValueError, match=message):
         call()
+
+
+def test_agents_that_nothing_joins_have_no_rate():
+    """Two circles apart, given in turn: rounding of their eigenvalues certifies nothing."""
+    rng = np.random.default_rng(9)
+    for _ in range(50):
+        first, second = np.zeros((5, 5)), np.zeros((5, 5))
+        first[[0, 1, 2], [1, 2, 0]] = rng.uniform(0.1, 2)
+        second[[3, 4], [4, 3]] = rng.uniform(0.1, 2)
+        assert BalancedSwitching([first, second], rng.uniform(0.1, 1, 2).tolist()).contraction().rate == 0.0

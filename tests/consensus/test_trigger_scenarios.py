@@ -141,8 +141,15 @@ NETWORKS = {
     **{law: replace(read_scenario(RING), trigger=trigger) for law, trigger in LAWS.items()},
     **{name: replace(read_scenario(RING), channel=channel) for name, channel in CHANNELS.items()},
 }
-QUICK = ("relative", "self_triggered", "loss")
-"""One law that hears its neighbours, one that computes ahead, one channel; the others are left to the long run."""
+PAIR = {
+    **RING,
+    "network": {"agents": 2, "edges": [[1, 2]], "initial": [1.0, -0.4]},
+    "weights": {"kind": "constant", "value": 0.6},
+}
+NETWORKS["pair_self_triggered"] = replace(read_scenario(PAIR), trigger=LAWS["self_triggered"])
+QUICK = ("relative", "pair_self_triggered", "loss")
+"""One law that hears its neighbours, one that computes ahead, one channel; the others are left to the long run. The C
+code of an agent that computes ahead grows with its neighbours and takes long to compile, so there are two agents."""
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in QUICK else [pytest.mark.long]) for n in NETWORKS])
