@@ -251,20 +251,19 @@ class Bounds:
         if not parts:
             return None
         carrier = min(decay for _, decay in parts)
-        least = math.inf
         trigger = self.analysis.scenario.trigger
         # Sampled checks let errors grow beyond the threshold, and still a broadcast needs an error of the threshold.
         level = trigger.threshold if trigger.kind is TriggerKind.SAMPLED else None
-        for c, decay in parts:
-            gap = part(c, decay, with_initial=decay == carrier, threshold=level)
-            if gap is None:
-                # Errors stay below the sum of all c, thresholds above those that do not decay.
-                lasting = sum(c for c, decay in parts if decay == 0)
-                gap = part(sum(c for c, _ in parts), 0.0, with_initial=True, threshold=lasting) if lasting else None
-            if gap is None:
-                return None
-            least = min(least, gap)
-        return least if math.isfinite(least) else None
+        gaps = [part(c, decay, with_initial=decay == carrier, threshold=level) for c, decay in parts]
+        known = [gap for gap in gaps if gap is not None]
+        found = [min(known)] if len(known) == len(parts) else []
+        # Errors also stay below the sum of all c, and thresholds above those that do not decay.
+        lasting = sum(c for c, decay in parts if decay == 0)
+        if lasting and len(parts) > 1:
+            whole = part(sum(c for c, _ in parts), 0.0, with_initial=True, threshold=lasting)
+            found += [] if whole is None else [whole]
+        gap = max(found, default=math.inf)
+        return gap if math.isfinite(gap) else None
 
     def _valid_part_gap(
         self, c: float, decay: float, *, with_initial: bool, threshold: float | None = None

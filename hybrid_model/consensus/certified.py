@@ -73,12 +73,12 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
         "transient",
         "1",
         ("printed", None, "paper, eq:stm inequality, leaves m_v open", ()),
-        ("valid", bounds.valid.overshoot if bounds.valid.rate else None, "audit, section 3, m_v", (union,)),
+        ("valid", bounds.valid.overshoot if bounds.valid.rate else None, "audit, section 3, m_v", (union, excited)),
         (
             "improved",
             math.exp(improved * analysis.window) if improved else None,
             "audit, section 3, in the coordinates xi",
-            (union,),
+            (union, excited),
         ),
         ("floquet", bounds.floquet_overshoot, "audit, section 7", (union, periodic)),
     )
@@ -89,10 +89,15 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
             "printed",
             bounds.printed_radius if _is_papers(bounds) else None,
             "paper, theorem 2, rho kappa_2",
-            (tree, paper, "beta below the printed rate"),
+            (tree, paper, "ideal channel", "beta below the printed rate"),
         ),
         ("valid", bounds.valid_radius, "audit, section 5.2", (union, errors, "beta below the valid rate")),
-        ("improved", bounds.improved_radius, "audit, end of section 5.2", (union, errors)),
+        (
+            "improved",
+            bounds.improved_radius,
+            "audit, end of section 5.2",
+            (union, errors, "beta below the improved rate"),
+        ),
         ("energy", bounds.energy_radius, "audit, section 5.3", (union, errors, below)),
         (
             "exact",
@@ -109,7 +114,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
             "printed",
             bounds.printed_gap if _is_papers(bounds) else None,
             "paper, eq:zeno dynamic upper bound",
-            (tree, paper, "beta below the printed rate"),
+            (tree, paper, "ideal channel", "beta below the printed rate"),
         ),
         ("valid", bounds.valid_gap, "audit, section 6, Lambert form", (union, errors, "beta below the valid rate")),
         (

@@ -50,6 +50,8 @@ def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
     """What is still true when a hypothesis fails."""
     analysis, name = bounds.analysis, hypothesis.name
     end = analysis.scenario.stop_time
+    if name == "trigger of the paper" and analysis.scenario.trigger.kind is TriggerKind.CONTINUOUS:
+        return "It has no events, so there is no gap to bound."
     if name == "exciting tree":
         return "The tree-free, energy and exact forms need no tree."
     scenario = analysis.scenario
@@ -77,6 +79,8 @@ def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
         )
     if name == "periodic weights":
         return "There is no Floquet rate; the exact radius is that of the run up to the stop time."
+    if name == "beta below the improved rate" and analysis.is_periodic:
+        return "The improved radius does not exist; the energy bound and the exact form go by the Floquet rate."
     if name == "beta below the improved rate":
         return "The energy bound does not exist; the exact radius and the gap hold for the run up to the stop time."
     if name == "bounded errors":

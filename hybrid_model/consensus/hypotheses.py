@@ -115,11 +115,9 @@ def bound_hypotheses(bounds: Bounds) -> list[Hypothesis]:
     """
     analysis = bounds.analysis
     constants, decay = analysis.tree_weights, analysis.scenario.trigger.decay
-    rates = {"printed": bounds.printed.rate, "valid": bounds.valid.rate}
+    rates = {"printed": bounds.printed.rate, "valid": bounds.valid.rate, "improved": bounds.improved_rate}
     if bounds.floquet_rate is not None:
         rates["Floquet"] = bounds.floquet_rate
-    else:
-        rates["improved"] = bounds.improved_rate
     excited, all_excited = bounds.printed.rate > 0, bounds.improved_rate > 0
     found = [
         Hypothesis(

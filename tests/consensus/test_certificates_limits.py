@@ -155,6 +155,16 @@ class TestWhatRemains:
         found = certify(scenario, arc, resolution=0.1)
         assert found.value("radius", "observed") == found.value("radius", "exact") == 0.0
 
+    def test_a_share_of_the_threshold_that_falls_fast_costs_no_gap(self):
+        """Without a period: a mixed threshold whose decay is far above every rate still has the gap of its offset."""
+        switching = {"kind": "random-dwell", "active": [[1, 2], [2, 3]], "shortest": 0.3, "longest": 0.9, "seed": 4}
+        trigger = {"kind": "mixed", "offset": 0.1, "threshold": 0.2, "decay": 3.0}
+        scenario = network(LINE, 4, {"kind": "constant", "value": 1.0}, trigger=trigger, switching=switching)
+        found = certify(scenario, window=2.0, resolution=0.1)
+        static = certify(replace(scenario, trigger=Trigger(TriggerKind.STATIC, 0.1)), window=2.0, resolution=0.1)
+        assert 0 < found.value("min_gap", "valid") <= found.value("min_gap", "improved")
+        assert 0.1 * static.value("min_gap", "improved") < found.value("min_gap", "improved")
+
     def test_an_edge_that_is_switched_off_for_ever(self):
         """The only jointly connected interval then lasts until the end: no window behind it holds another one."""
         switching = {"kind": "sequence", "dwell": [2.0, 28.0], "active": [[1, 2], [1]]}
