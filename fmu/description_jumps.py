@@ -22,7 +22,7 @@ def states_reset(traced: Any) -> frozenset[int]:
     traced : Trace or NetworkTrace
         With its jump maps, or those of its groups of parts.
     """
-    return frozenset[int]().union(*_changes(traced, Kind.STATE))
+    return frozenset[int]().union(*changes(traced, Kind.STATE))
 
 
 def output_jumps(traced: Any, kind: Kind) -> list[frozenset[int] | None]:
@@ -41,7 +41,7 @@ def output_jumps(traced: Any, kind: Kind) -> list[frozenset[int] | None]:
         Numbers of the jumps, one set an element; None where something else than a jump changes it as well.
     """
     jumps: list[set[int]] = [set() for _ in range(traced.layout.sizes[Kind.DISCRETE])]
-    for jump, elements in enumerate(_changes(traced, Kind.DISCRETE)):
+    for jump, elements in enumerate(changes(traced, Kind.DISCRETE)):
         for element in elements:
             jumps[element].add(jump)
     by_state = [frozenset(found) for found in jumps]
@@ -58,8 +58,16 @@ def output_jumps(traced: Any, kind: Kind) -> list[frozenset[int] | None]:
     ]
 
 
-def _changes(traced: Any, kind: Kind) -> list[frozenset[int]]:
-    """Return the elements of x or z that each jump may change."""
+def changes(traced: Any, kind: Kind) -> list[frozenset[int]]:
+    """Return the elements that each jump may change of the continuous states, or of the discrete ones.
+
+    Parameters
+    ----------
+    traced : Trace or NetworkTrace
+        As for `states_reset`.
+    kind : {Kind.STATE, Kind.DISCRETE}
+        Which vector.
+    """
     resets = getattr(traced, "resets", None)
     if resets is not None:
         return [_changed(reset, _RESULTS.index(kind)) for reset in resets]

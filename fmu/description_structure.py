@@ -1,5 +1,7 @@
 """ModelStructure of an FMU: its unknowns, what each depends on and how, the same for both versions of the standard.
 
+Discrete outputs depend on what decides about the next jump as well: in Event Mode they show its outcome.
+
 What may be listed as known (3.0, section 2.4.8; 2.0, section 2.2.8): while the FMU runs inputs, continuous states and
 time; in Initialization Mode inputs, time, and everything whose start value can be set. Parameters and discrete states
 do not change between events, so they are no knowns of a running FMU.
@@ -15,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
+from fmu.description_events import after_jumps
 from fmu.description_factors import Factor, factors
 from fmu.variables import Bank, FmiType, FmuVariable
 from hybrid_model.transitions import Priority, Trigger
@@ -24,6 +27,7 @@ Matrix: TypeAlias = Any  # scipy.sparse.csr_array of int
 """Elements of a result by elements of all arguments side by side; `Factor` + 1 where one depends on the other."""
 _ARGUMENTS = {"t": Bank.TIME, "x": Bank.STATE, "z": Bank.DISCRETE, "u": Bank.INPUT, "p": Bank.PARAMETER}
 _MAPS = ("flow", "outputs", "margins", "flow_set")
+_EVENTS = ("z after", "outputs after")
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,7 @@ class _Maps:
         self.begins = dict(zip(_ARGUMENTS.values(), self.ends[:-1].tolist(), strict=True))
         self.parts: dict[str, Matrix] = {name: self._row(name) for name in _MAPS}
         self.parts |= {name: self._itself(name) for name in ("t", "x", "z")}
+        self.parts |= self._events()
 
     def at_start(self) -> _Maps:
         """Return the dependencies at the start, where computed states come out of the start map."""
@@ -114,8 +119,21 @@ class _Maps:
         start: _Maps = object.__new__(_Maps)
         start.traced, start.told, start.margins = self.traced, self.told, self.margins
         start.ends, start.begins = self.ends, self.begins
-        start.parts = {name: _chained(matrix, chain) for name, matrix in self.parts.items()}
+        start.parts = {name: _chained(matrix, chain) for name, matrix in self.parts.items() if name not in _EVENTS}
         return start
+
+    def _events(self) -> dict[str, Matrix]:
+        """Return what discrete states and outputs depend on in Event Mode by way of the jump that comes next."""
+        after = after_jumps(self.traced, self.parts["margins"], self.parts["flow_set"])
+        outputs = (self.parts["outputs"] != 0).astype(np.int64)
+        columns = (self._columns(Bank.STATE), self._columns(Bank.DISCRETE))
+        by_states = [outputs[:, at] @ after[kind].astype(np.int64) for at, kind in zip(columns, after, strict=True)]
+        found = {"z after": after[Kind.DISCRETE], "outputs after": by_states[0] + by_states[1]}
+        return {name: (matrix != 0).astype(np.int64) * (Factor.DEPENDENT + 1) for name, matrix in found.items()}
+
+    def _columns(self, bank: Bank) -> slice:
+        number = list(_ARGUMENTS.values()).index(bank)
+        return slice(int(self.ends[number]), int(self.ends[number + 1]))
 
     def _row(self, result: str) -> Matrix:
         if self.told:
@@ -173,7 +191,9 @@ class _Maps:
         automaton, index, size = self.traced.automaton, variable.index, variable.size
         plain = {Bank.DERIVATIVE: "flow", Bank.OUTPUT: "outputs", Bank.STATE: "x", Bank.DISCRETE: "z", Bank.TIME: "t"}
         if variable.bank in plain:
-            return [(plain[variable.bank], index, size)]
+            name = plain[variable.bank]
+            shown = variable.causality == "output" and variable.discrete and f"{name} after" in self.parts
+            return [(name, index, size), *([(f"{name} after", index, size)] if shown else [])]
         if variable.bank is Bank.INDICATOR:
             return [("margins", index, 1) if index < len(self.margins) else ("flow_set", 0, 1)]
         if variable.bank is Bank.CLOCK:

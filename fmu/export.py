@@ -34,6 +34,7 @@ def export_fmu(
     stop_time: float | None = None,
     step_size: float | None = None,
     sources: bool = True,
+    clocks: bool = True,
     progress: Callable[[str], None] | None = None,
 ) -> Path:
     """Write an automaton as an FMU: compiled code that needs no Python to run.
@@ -55,6 +56,9 @@ def export_fmu(
         the results of a run in Python up to it, except for large networks (`fmu.network.worth_looping`).
     sources : bool
         Whether the archive holds the C sources as well.
+    clocks : bool
+        Whether an FMU of FMI 3.0 shows its clocks: those that tick with jumps, and the countdown to the next event.
+        Some importers take every variable for a number; events are handled in any case.
     progress : callable, optional
         Told in a few words what is being done.
 
@@ -74,7 +78,7 @@ def export_fmu(
     chosen = _kinds(kinds)
     check_target(target)
     traced = trace_any(automaton)
-    variables = fmu_variables(traced, version)
+    variables = fmu_variables(traced, version, clocks=clocks)
     runtime = runtime_sources(version.value)
 
     code = model_code(traced, variables, _TOKEN, chosen)

@@ -66,6 +66,10 @@ class NetworkPattern:
         sources = self._sources(number)
         return frozenset().union(*(banks[bank][place] for bank, place in (sources[k] for k in elements)))
 
+    def of_reset(self, number: int, jump: int, kind: Kind) -> list[Dependencies]:
+        """Return what the new states of a member depend on after its jump number `jump`, element by element."""
+        return self._rows(number, f"reset{jump}", (Kind.STATE, Kind.DISCRETE).index(kind), self._given())
+
     def outside(self, found: Dependencies, *, time: bool) -> bool:
         """Whether there are continuous states, inputs or, if asked, the time among what something depends on."""
         states, inputs = range(self._ends[1], self._ends[2]), range(self._ends[3], self._ends[4])

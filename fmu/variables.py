@@ -133,7 +133,7 @@ _BANKS = {
 }
 
 
-def fmu_variables(traced: Trace | NetworkTrace, fmi: Fmi = Fmi.V3_0) -> tuple[FmuVariable, ...]:
+def fmu_variables(traced: Trace | NetworkTrace, fmi: Fmi = Fmi.V3_0, *, clocks: bool = True) -> tuple[FmuVariable, ...]:
     """List the variables of an FMU: time, parameters, inputs, outputs, states, derivatives, margins, clocks.
 
     Parameters
@@ -142,6 +142,8 @@ def fmu_variables(traced: Trace | NetworkTrace, fmi: Fmi = Fmi.V3_0) -> tuple[Fm
         The automaton; its discrete states declared internal are not listed.
     fmi : Fmi
         Version of the standard.
+    clocks : bool
+        Whether an FMU of FMI 3.0 shows its clocks.
 
     Returns
     -------
@@ -163,7 +165,7 @@ def fmu_variables(traced: Trace | NetworkTrace, fmi: Fmi = Fmi.V3_0) -> tuple[Fm
     if fmi is Fmi.V2_0:
         table.append(_stop_at_events())
     else:
-        table += [*_margins(automaton), *_clocks(automaton, layout)]
+        table += [*_margins(automaton), *(_clocks(automaton, layout) if clocks else [])]
         table[1:1] = _sizes(table)
     twice = next((name for name, count in Counter(v.name for v in table).items() if count > 1), None)
     if twice is not None:

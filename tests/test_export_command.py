@@ -5,6 +5,7 @@ import subprocess
 import sys
 import zipfile
 
+import fmpy
 import pytest
 
 from cosim.cli.main import main
@@ -120,7 +121,8 @@ def test_the_options_reach_the_exporter(here, monkeypatch):
     """Kinds and platforms in a fixed order; nothing chosen is everything, or this machine."""
     seen = []
 
-    def note(automaton, path, *, fmi, kinds, platforms, stop_time, step_size, progress):
+    def note(automaton, path, *, fmi, kinds, platforms, stop_time, step_size, clocks, progress):
+        assert clocks
         seen.append((fmi, kinds, platforms, stop_time, step_size))
         return path
 
@@ -152,3 +154,14 @@ def test_progress_is_for_terminals_only(here, capsys, monkeypatch):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     assert main(["export", "fading:Decay", "--out", "out"]) == 0
     assert "exporting Decay (1 of 1)" in capsys.readouterr().err
+
+
+def test_clocks_can_be_left_out(here):
+    target = "hybrid_model.models:BouncingBall"
+    assert main(["export", target, "--out", "with"]) == 0
+    assert main(["export", target, "--no-clocks", "--out", "without"]) == 0
+    shown, plain = (description(here / folder / "BouncingBall.fmu") for folder in ("with", "without"))
+    assert (shown.count("<Clock "), plain.count("<Clock ")) == (2, 0)
+    run = {"stop_time": 1.0, "output": ["h"], "use_event_mode": True, "early_return_allowed": True}
+    heights = [fmpy.simulate_fmu(str(here / folder / "BouncingBall.fmu"), **run)["h"] for folder in ("with", "without")]
+    assert list(heights[0]) == list(heights[1])

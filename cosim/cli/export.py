@@ -61,6 +61,7 @@ def add_parser(commands: Any) -> None:
         metavar="NAME=VALUE",
         help="start value, parameter or length of a class's instance; repeatable",
     )
+    parser.add_argument("--no-clocks", action="store_true", help="no clocks, for importers that know none (FMI 3.0)")
     parser.set_defaults(run=run)
 
 
@@ -81,6 +82,7 @@ def run(options: argparse.Namespace) -> int:
                 platforms=_platforms(options.platform),
                 stop_time=stop_time if options.stop_time is None else options.stop_time,
                 step_size=options.step_size,
+                clocks=not options.no_clocks,
                 progress=progress,
             )
             print(written)

@@ -106,6 +106,41 @@ def test_indicators_and_clocks_depend_on_what_their_margins_do():
     assert {"h", "v"} <= set(outputs["impact"]) <= {"h", "v", "next_event"}
 
 
+class Watcher(hm.HybridAutomaton):
+    """Counts when an input comes near, and remembers another one."""
+
+    near = hm.Input(0.0)
+    value = hm.Input(0.0, discrete=True)
+    other = hm.Input(0.0)
+    level = hm.Parameter(1.0)
+    seen = hm.DiscreteState(0.0, output=True)
+    ticks = hm.DiscreteState(0, integer=True, output=True)
+    still = hm.DiscreteState(0.0, output=True)
+    doubled = hm.Output(discrete=True)
+
+    def jump_set(self, s):
+        return s.near - s.level - s.ticks
+
+    def jump_map(self, s):
+        return {"seen": s.value, "ticks": s.ticks + 1}
+
+    def outputs(self, s):
+        return {"doubled": 2.0 * s.seen}
+
+
+@pytest.mark.parametrize("fmi", BOTH)
+def test_discrete_outputs_depend_on_what_decides_about_the_next_jump(fmi):
+    """In Event Mode they show its outcome at once: margins decide whether, jump maps what."""
+    traced = trace(Watcher())
+    variables = fmu_variables(traced, fmi)
+    found = {
+        variables[u.variable].name: {variables[k].name for k in u.dependencies}
+        for u in model_structure(traced, variables).outputs
+    }
+    found.pop("clock", None)
+    assert found == {"seen": {"near", "value"}, "ticks": {"near"}, "still": set(), "doubled": {"near", "value"}}
+
+
 def test_derivatives_are_in_the_order_of_the_state_vector():
     description = described(Kinds(), Fmi.V3_0)
     variables = description.variables
