@@ -1,5 +1,7 @@
 """Random networks, weights and switching for the certificates: what one seeded generator draws."""
 
+import math
+
 import numpy as np
 
 from hybrid_model.consensus.analysis import connected_parts
@@ -20,6 +22,9 @@ GRAPHS = ("path", "ring", "star", "complete", "regular", "erdos-renyi", "geometr
 SWITCHING = ("none", "periodic", "sequence", "random-dwell", "markov", "jointly-connected")
 BASE = 2.0
 """Length [s] of what repeats in a network; all periods are simple fractions or multiples of it."""
+
+LONGEST_RUN = 100.0
+"""Time [s] that what does not repeat is given for."""
 
 
 def drawn_scenario(random, most_agents, *, weights=None, switching=None, stop_time=8.0):
@@ -118,8 +123,10 @@ def drawn_switching(random, kind, m, repeats):
     if kind == "periodic":
         return {"kind": kind, "dwell": BASE * float(random.choice([0.25, 0.5, 1.0])), "active": active}
     if kind == "sequence":
-        dwells = random.integers(1, 4, len(active)) * BASE / 4
-        return {"kind": kind, "dwell": dwells.tolist(), "active": active, "repeat": repeats}
+        dwells = (random.integers(1, 4, len(active)) * BASE / 4).tolist()
+        # A sequence that does not repeat must cover the run.
+        rounds = 1 if repeats else math.ceil(LONGEST_RUN / sum(dwells))
+        return {"kind": kind, "dwell": dwells * rounds, "active": active * rounds, "repeat": repeats}
     if kind == "random-dwell":
         if not repeats:
             steady["longest"] = BASE
