@@ -52,7 +52,7 @@ def model_code(
     """
     maps, work = _maps(traced)
     tables = [*_tables(traced, variables), _model(traced, variables, token, kinds, work)]
-    return "\n".join([maps, *tables])
+    return "\n".join([_PRELUDE, maps, *tables])
 
 
 def _maps(traced: Trace | NetworkTrace) -> tuple[str, Sequence[int]]:
@@ -72,6 +72,14 @@ _MAPS = (
     *("start", "flow", "flow_set", "margins", "times", "outputs", "reset"),
     *("forward", "reverse", "start_forward", "start_reverse"),
 )
+_PRELUDE = """\
+/* Generated from an automaton.  Its names stay inside, and its maps need not use all that they are given. */
+#include <math.h>
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+"""
 _RESET = """\
 static int hybrid_reset(size_t jump, const double **arg, double **res, long long *iw, double *w)
 {

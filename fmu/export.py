@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import tempfile
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
@@ -70,11 +71,12 @@ def export_fmu(
     Raises
     ------
     ExportError
-        If a map cannot be traced, a name is taken twice, or an option is unknown.
+        If a map cannot be traced, a name is taken twice, an option is unknown, or a time is not finite and positive.
     fmu.build.BuildError
         If there is no C compiler, the code does not compile, or the file cannot be written.
     """
     version, target = _version(fmi), Path(path)
+    _check_experiment(stop_time, step_size)
     chosen = _kinds(kinds)
     check_target(target)
     traced = trace_any(automaton)
@@ -112,6 +114,12 @@ def export_fmu(
             progress=progress,
         )
     return package(members, target)
+
+
+def _check_experiment(stop_time: float | None, step_size: float | None) -> None:
+    for name, value in (("stop time", stop_time), ("step size", step_size)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise ExportError(f"The {name} {value} s cannot be proposed: give a finite number above zero, or none.")
 
 
 def _headers() -> list[Path]:

@@ -1,5 +1,6 @@
 """`hybrid-fmu export` as its users see it: targets, options, files, exit status, sentences."""
 
+import math
 import os
 import subprocess
 import sys
@@ -9,7 +10,10 @@ import fmpy
 import pytest
 
 from cosim.cli.main import main
+from fmu.errors import ExportError
+from fmu.export import export_fmu
 from fmu.platforms import PLATFORMS, this_platform
+from hybrid_model.models import BouncingBall
 
 MODEL = '''
 import hybrid_model as hm
@@ -165,3 +169,28 @@ def test_clocks_can_be_left_out(here):
     run = {"stop_time": 1.0, "output": ["h"], "use_event_mode": True, "early_return_allowed": True}
     heights = [fmpy.simulate_fmu(str(here / folder / "BouncingBall.fmu"), **run)["h"] for folder in ("with", "without")]
     assert list(heights[0]) == list(heights[1])
+
+
+@pytest.mark.parametrize("option", ["--stop-time", "--step-size"])
+@pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "soon"])
+def test_times_that_no_experiment_has_are_wrong_usage(here, capsys, option, value):
+    with pytest.raises(SystemExit) as stopped:
+        main(["export", "fading:Decay", f"{option}={value}", "--out", "out"])
+    assert stopped.value.code == 2
+    assert f"{value!r} is not a finite number of seconds above zero" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("times", [{"stop_time": math.nan}, {"stop_time": -1.0}, {"step_size": 0.0}])
+def test_times_that_no_experiment_has_are_refused_by_the_exporter(here, times):
+    with pytest.raises(ExportError, match=r"cannot be proposed: give a finite number above zero, or none\."):
+        export_fmu(BouncingBall(), here / "ball.fmu", **times)
+    assert not (here / "ball.fmu").exists()
+
+
+def test_an_interrupted_command_ends_quietly(here, monkeypatch, capsys):
+    def interrupt(*arguments, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.cli.export.export_fmu", interrupt)
+    assert main(["export", "fading:Decay", "--out", "out"]) == 130
+    assert capsys.readouterr().err == ""

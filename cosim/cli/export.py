@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import math
 import os
 import re
 import sys
@@ -52,8 +53,10 @@ def add_parser(commands: Any) -> None:
         help="where the FMU shall run; repeatable; others than this machine's, the default, need the package ziglang",
     )
     parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the FMUs")
-    parser.add_argument("--stop-time", type=float, help="stop time in s that the FMU proposes; default: a scenario's")
-    parser.add_argument("--step-size", type=float, help="communication step in s that the FMU proposes")
+    parser.add_argument(
+        "--stop-time", type=_seconds, help="stop time in s that the FMU proposes; default: a scenario's"
+    )
+    parser.add_argument("--step-size", type=_seconds, help="communication step in s that the FMU proposes")
     parser.add_argument(
         "--start-value",
         action="append",
@@ -63,6 +66,16 @@ def add_parser(commands: Any) -> None:
     )
     parser.add_argument("--no-clocks", action="store_true", help="no clocks, for importers that know none (FMI 3.0)")
     parser.set_defaults(run=run)
+
+
+def _seconds(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number of seconds above zero")
+    return value
 
 
 def run(options: argparse.Namespace) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 
@@ -13,6 +14,9 @@ from fmu.build import BuildError
 from fmu.errors import ExportError
 from hybrid_model import HybridModelError
 from hybrid_model.consensus.tables import ScenarioError
+
+_INTERRUPTED = 130
+"""Status of a command that was interrupted from the keyboard, as shells have it."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,6 +45,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(options.run(options))
     except (ScenarioError, UsageError) as error:
         return _report(error, Exit.USAGE)
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+    except BrokenPipeError:
+        # Whoever read the output has seen enough; Python's own attempt to flush it would fail once more.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return int(Exit.DONE)
     except (HybridModelError, ExportError, BuildError, CosimError, OSError) as error:
         return _report(error, Exit.FAILED)
 

@@ -12,6 +12,7 @@ from fmpy.model_description import ValidationError
 from fmu.check.description import Description
 from fmu.check.findings import Finding, error, note
 
+_MANY = 5
 _INITIAL = re.compile(r".*InitialUnknowns does not contain.*Expected \{(.*)\} but was \{(.*)\}\.", re.DOTALL)
 
 
@@ -56,9 +57,15 @@ def _finding(problem: str, description: Description) -> Finding:
         if expected != actual and expected - actual <= clocks and actual - expected <= clocked:
             return note(
                 "fmpy.clocks",
-                f"fmpy asks for the clocks {', '.join(sorted(expected - actual)) or '(none)'} among the "
+                f"fmpy asks for the clocks {_some(sorted(expected - actual))} among the "
                 "InitialUnknowns; "
                 "the standard does not: clocks have no initial value.",
                 "FMI 3.0.2 section 2.4.8, InitialUnknown",
             )
     return error("fmpy.validation", problem, "fmpy.validation")
+
+
+def _some(names: list[str]) -> str:
+    """Return names joined by commas, the first few of many."""
+    shown = ", ".join(names[:_MANY]) or "(none)"
+    return shown + (f" and {len(names) - _MANY} more" if len(names) > _MANY else "")

@@ -116,11 +116,19 @@ static bool too_many_steps(Engine *engine)
                    ADVANCE_STEPS, *engine->live.time, engine->model->name);
 }
 
+/* How far a look ahead goes: a call of the importer's must come back in a fraction of a second, also where one
+   step of the solver is a matter of thousands of states and margins. */
+static size_t look_ahead_steps(const Model *m)
+{
+    size_t size = 1 + m->n_states + m->n_margins + m->n_times, steps = LOOK_AHEAD_WORK / size;
+    return steps > LOOK_AHEAD_STEPS ? LOOK_AHEAD_STEPS : steps < LEAST_STEPS_AHEAD ? LEAST_STEPS_AHEAD : steps;
+}
+
 bool engine_predict(Engine *engine, double limit, double *event_time)
 {
     Status *status = engine->status;
     double now = *engine->live.time, horizon = now + LOOK_AHEAD_TIME * fmax(1.0, fabs(now));
-    size_t budget = LOOK_AHEAD_STEPS;
+    size_t budget = look_ahead_steps(engine->model);
     status->prediction = PREDICTION_NONE;
     if (status->ending != ENDED_NOT)
         return false;
@@ -282,8 +290,12 @@ static void look_ahead(Engine *engine)
 {
     Status *status = engine->status;
     double event, now = *engine->live.time;
-    if (status->settled && status->prediction == PREDICTION_NONE && engine->model->predictable && !engine->hook)
+    if (status->settled && status->prediction == PREDICTION_NONE && engine->model->predictable && !engine->hook) {
         engine_predict(engine, now + STEPS_AHEAD * (engine->target - now), &event);
+        /* Nobody has been told to come back where the budget ended: up to there it is quiet. */
+        if (status->prediction == PREDICTION_RENEWAL)
+            status->prediction = PREDICTION_QUIET;
+    }
     status->settled = true;
 }
 
@@ -320,6 +332,9 @@ Advance engine_advance(Engine *engine, double target, EventPolicy policy)
     engine_clear_ticks(engine);
     engine->view = VIEW_NONE;
     engine->target = target;
+    /* With a hook the solver makes no steps beyond the target. */
+    if (engine->hook)
+        engine->status->has_segment = false;
     look_ahead(engine);
     Progress progress = follow_prediction(engine, &budget, &end);
     if (progress == ON_THE_WAY && end == FLOW_REACHED)

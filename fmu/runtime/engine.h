@@ -12,6 +12,10 @@
 #include "model.h"
 
 #if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
+
+#if defined(__GNUC__)
 #define LIKE_PRINTF(text, first) __attribute__((format(printf, text, first)))
 #else
 #define LIKE_PRINTF(text, first)
@@ -137,5 +141,9 @@ void end_text_cleanly(char *text);
 
 /* The distance from |t| to the next larger double. */
 double time_ulp(double t);
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
 
 #endif

@@ -10,6 +10,10 @@
 
 #include "engine.h"
 
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
+
 /* Numbered as fmi2Status and fmi3Status are. */
 typedef enum { ANSWER_OK, ANSWER_WARNING, ANSWER_DISCARD, ANSWER_ERROR } Answer;
 typedef enum { CO_SIMULATION, MODEL_EXCHANGE } Interface;
@@ -177,5 +181,9 @@ Answer instance_derivatives(void *handle, const char *function, const Direction 
                             bool forward);
 Answer instance_output_rates(void *handle, const char *function, const Reference references[], size_t n,
                              const int32_t orders[], double values[], size_t n_values);
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
 
 #endif

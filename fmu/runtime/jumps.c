@@ -29,7 +29,8 @@ static bool not_finite(Engine *engine, size_t jump, size_t i, double t)
                    "'%s' becomes %g at t = %.17g by %s%s%s; states must be finite. Remedy: check that map and the "
                    "parameters.",
                    NAME_AT(m, state_name(m, i)), engine->reset.x[i], t,
-                   starts ? "its start value" : "the jump map of '", starts ? "" : NAME_AT(m, m->jumps[jump].name), starts ? "" : "'");
+                   starts ? "its start value" : "the jump map of '",
+                   starts ? "" : NAME_AT(m, m->jumps[jump].name), starts ? "" : "'");
 }
 
 bool accept_state(Engine *engine, size_t jump, const Point *point)

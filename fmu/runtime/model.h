@@ -10,6 +10,11 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* The names of an FMU's inside stay inside, whatever flags it is compiled with. */
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
+
 /* Calling convention of the generated functions (CasADi): arg[i] is input i (NULL: zeros), res[i] output i
    (NULL: not wanted), iw and w are work arrays of n_iw integers and n_w doubles; 0 means success. */
 typedef int (*ModelFunction)(const double **arg, double **res, long long *iw, double *w, int mem);
@@ -90,5 +95,9 @@ typedef struct {
 const char *write_name(const Model *m, ModelName name, char text[NAME_SIZE]);
 
 extern const Model model;
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
 
 #endif

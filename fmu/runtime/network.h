@@ -11,6 +11,10 @@
 
 #include "model.h"
 
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
+
 /* A map and its derivatives.  Arguments of `value`: t, x, z, u, p of the part, and its constants; `forward` takes the
    tangents of t, x, z, u, p after them and gives those of the results; `reverse` takes the adjoints of the results
    after them and gives those of t, x, z, u, p. */
@@ -81,5 +85,9 @@ int network_forward(const Network *network, const double **arg, double **res, lo
 int network_reverse(const Network *network, const double **arg, double **res, long long *iw, double *w);
 int network_start_forward(const Network *network, const double **arg, double **res, long long *iw, double *w);
 int network_start_reverse(const Network *network, const double **arg, double **res, long long *iw, double *w);
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
 
 #endif

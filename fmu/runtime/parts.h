@@ -6,6 +6,10 @@
 
 #include "engine.h"
 
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
+
 #define N_STAGES 7            /* Dormand-Prince 5(4) */
 #define N_SAMPLES 9           /* of each margin, where a step is looked at for crossings */
 #define N_ZENO_TIMES 12       /* remembered times of each jump */
@@ -26,6 +30,8 @@
 #define LEAVING_RATE 1e-6
 #define LEAVING_TIME 1e-6
 #define LOOK_AHEAD_STEPS 20000
+#define LOOK_AHEAD_WORK 200000    /* steps times states, margins and times */
+#define LEAST_STEPS_AHEAD 20
 #define LOOK_AHEAD_TIME 1e6
 #define ADVANCE_STEPS 1000000
 /* So many steps of the importer are looked ahead at once. */
@@ -203,5 +209,9 @@ bool raise_levels_here(Engine *engine, const Point *point);
 /* zeno.c */
 /* Records a jump of the live point at its time; false if it is one too many. */
 bool zeno_record(Engine *engine, size_t jump);
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
 
 #endif

@@ -1,4 +1,5 @@
 /* Saved states in memory, and as bytes that can be kept and moved. */
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -168,6 +169,11 @@ Answer instance_serialize(void *handle, const char *function, const void *state,
     return ANSWER_OK;
 }
 
+static bool is_sound(const Run *run)
+{
+    return is_one_of(run->mode, MODE_ANY) && isfinite(run->time) && !isnan(run->stop_time) && !isnan(run->next_event);
+}
+
 /* What is wrong with the bytes, NULL if nothing is. */
 static const char *fault(const Instance *instance, const unsigned char *bytes, size_t size)
 {
@@ -206,7 +212,7 @@ Answer instance_deserialize(void *handle, const char *function, const unsigned c
     if (saved) {
         memcpy(saved->block, bytes + HEADER_SIZE, saved->size);
         const Run *run = engine_wrapper_in(instance->engine, saved->block);
-        if (!engine_block_is_sound(instance->engine, saved->block) || !is_one_of(run->mode, MODE_ANY))
+        if (!engine_block_is_sound(instance->engine, saved->block) || !is_sound(run))
             wrong = "what they hold cannot be a state";
     }
     if (wrong) {

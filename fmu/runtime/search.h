@@ -5,6 +5,10 @@
 
 #include "parts.h"
 
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
+
 #define DEGREE (N_SAMPLES - 1)
 /* How often one row is halved in one step: a simple crossing needs none, a kink some ten. */
 #define HALVINGS 60
@@ -60,5 +64,9 @@ double sample_time(double a, double b, size_t i);
 void begin_rises(Rises *rises, Search *search, size_t row, double threshold);
 /* The next bracket among the pieces that begin up to `latest`; false if there is none, or on failure. */
 bool next_rise(Rises *rises, double latest, Bracket *bracket);
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
 
 #endif

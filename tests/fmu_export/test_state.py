@@ -5,9 +5,10 @@ import random
 
 import pytest
 from catalogue import cases
-from fmu_driver import ERROR, OK, Instance, Library, Walk
+from fmu_driver import ERROR, OK, Instance, Library, Walk, advance
 from witnesses import Cascade, Mix, Ramps
 
+import hybrid_model as hm
 from hybrid_model.models import BouncingBall
 
 
@@ -247,3 +248,41 @@ def test_a_state_of_another_model_is_refused(library):
     other.do("FreeFMUState", c.byref(foreign))
     other.free()
     instance.free()
+
+
+class Wheels(hm.HybridAutomaton):
+    """Many wheels that turn for ever; one of them rings now and then."""
+
+    wheels = hm.Dimension()
+    a = hm.State(1.0, shape="wheels")
+    b = hm.State(0.0, shape="wheels")
+    rate = hm.Parameter(1.0, shape="wheels")
+    rings = hm.DiscreteState(0, integer=True, output=True)
+    bell = hm.Clock("jump")
+
+    def flow_map(self, s):
+        return {"a": -s.rate * s.b, "b": s.rate * s.a}
+
+    def jump_set(self, s):
+        return s.t - 30.0 * (s.rings + 1)
+
+    def jump_map(self, s):
+        return {"rings": s.rings + 1}
+
+
+@pytest.mark.parametrize("obey", [True, False])
+def test_the_look_ahead_of_a_large_model_stops_where_it_costs_too_much(obey, exported):
+    """What it announces then is no event, and those that come are found all the same."""
+    small, large = Wheels(wheels=2), Wheels(wheels=400)
+    found = {}
+    for name, automaton in (("small", small), ("large", large)):
+        instance = Instance(Library(exported(automaton, f"wheels_{name}")))
+        instance.initialize(0.0, 70.0)
+        found[name] = instance.iterate()[1].next_time
+        instance.do("EnterStepMode")
+        instance.do("EnterEventMode")
+        record = advance(instance, [0.0, 35.0, 70.0], obey=obey)
+        assert [t for t, _ in record.ticks] == pytest.approx([30.0, 60.0], abs=1e-9)
+        instance.free()
+    assert found["small"] == pytest.approx(30.0, abs=1e-9)
+    assert 0.0 < found["large"] < 20.0

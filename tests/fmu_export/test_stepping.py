@@ -205,6 +205,19 @@ def test_time_is_that_of_the_arguments(label, h, binaries):
     component.free()
 
 
+@pytest.mark.parametrize("label", ["2.0 CS", "3.0 CS without events"])
+@pytest.mark.parametrize(("stop", "n"), [(1 / 3, 1000), (1 / 3, 30000), (1.1, 11000), (1e4 / 7, 7000)])
+def test_an_importer_that_adds_up_its_steps_arrives_at_the_stop_time(label, stop, n, binaries):
+    component = instance(binaries["ramps"], label)
+    component.begin(0.0, stop)
+    t = 0.0
+    for _ in range(n):
+        assert component.step(t, stop / n).status == OK
+        t += stop / n
+    assert component.step(t, stop / n).status == ERROR
+    component.free()
+
+
 @LABELS
 @pytest.mark.parametrize(
     ("start", "stop", "tolerance", "word"),
