@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 import hybrid_model as hm
 from fmu.trace import trace
-from fmu.variables import fmu_variables
+from fmu.variables import Fmi, fmu_variables
 from hybrid_model.state_space import state_space
 
 A = [[0.0, 1.0], [-2.0, -0.4]]
@@ -90,11 +90,11 @@ def test_sampled_systems_make_no_algebraic_loop():
 
 
 def test_matrices_are_parameters_of_the_fmu():
-    table = {v.name: v for v in fmu_variables(trace(state_space(A, B, C, D, **NAMES)))}
-    assert table["A[2,1]"].start == -2.0
+    table = {v.name: v for v in fmu_variables(trace(state_space(A, B, C, D, **NAMES)), Fmi.V2_0)}
+    assert table["A[2,1]"].start == (-2.0,)
     assert table["A[2,1]"].causality == "parameter"
     # The column of `force`, the one input with feedthrough.
-    assert table["D[2,1]"].start == 3.0
+    assert table["D[2,1]"].start == (3.0,)
     assert "D[2,2]" not in table
     assert table["force"].causality == "input"
     assert table["mixed"].causality == "output"

@@ -235,14 +235,17 @@ static bool follow_steps(Engine *engine, double target, double quiet_until)
 typedef enum { ON_THE_WAY, AT_PREDICTED_EVENT, NOT_PREDICTED } Progress;
 
 /* Uses the prediction, if there is one, as far as it carries. */
-static Progress follow_prediction(Engine *engine, size_t *budget, FlowEnd *end)
+static Progress follow_prediction(Engine *engine, EventPolicy policy, size_t *budget, FlowEnd *end)
 {
     double event = *engine->predicted.time, target = engine->target;
     Prediction prediction = (Prediction)engine->status->prediction;
     bool quiet = prediction == PREDICTION_QUIET;
+    /* Where events are taken inside, one a little behind the target is reached with it: rounding does not decide. */
+    bool inside = prediction == PREDICTION_EVENT && (policy == EVENTS_INSIDE || policy == EVENTS_STOP_AFTER);
+    double slack = inside ? event_tolerance(event) : 4.0 * time_ulp(event);
     if (prediction == PREDICTION_NONE)
         return NOT_PREDICTED;
-    if (quiet ? target <= event : target < event - 4.0 * time_ulp(event)) {
+    if (quiet ? target <= event : target < event - slack) {
         /* A hook wants to see each step, so none may go beyond the target. */
         if (engine->hook || !follow_steps(engine, target, event))
             *end = flow(engine, &engine->live, target, false, budget);
@@ -336,7 +339,7 @@ Advance engine_advance(Engine *engine, double target, EventPolicy policy)
     if (engine->hook)
         engine->status->has_segment = false;
     look_ahead(engine);
-    Progress progress = follow_prediction(engine, &budget, &end);
+    Progress progress = follow_prediction(engine, policy, &budget, &end);
     if (progress == ON_THE_WAY && end == FLOW_REACHED)
         return ADVANCE_REACHED;
     if (progress == ON_THE_WAY && end != FLOW_CHANGED) {

@@ -11,7 +11,12 @@ from fmu.errors import ExportError
 from fmu.export import export_fmu
 
 
-@pytest.mark.parametrize("name", list(cases()))
+QUICK = ("bouncing_ball", "agent2_dynamic", "thermostat", "newtons_cradle")
+"""fmpy takes its time with names of many parts."""
+MODELS = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in cases()]
+
+
+@pytest.mark.parametrize("name", MODELS)
 def test_fmpy_finds_nothing(name, exported):
     automaton = cases()[name].automaton
     clocks = {clock.name for clock in automaton.clocks}
