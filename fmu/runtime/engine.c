@@ -234,18 +234,25 @@ static bool follow_steps(Engine *engine, double target, double quiet_until)
 
 typedef enum { ON_THE_WAY, AT_PREDICTED_EVENT, NOT_PREDICTED } Progress;
 
+/* Where events are taken inside, a guard that is crossed a little behind the target is reached with it: rounding
+   does not decide.  Time events have their times. */
+static bool reached_with(Engine *engine, EventPolicy policy, double event)
+{
+    bool inside = policy == EVENTS_INSIDE || policy == EVENTS_STOP_AFTER;
+    return inside && engine->status->prediction == PREDICTION_EVENT &&
+           engine->target >= event - event_tolerance(event) && evaluate_times(engine, &engine->live) &&
+           next_time(engine, &engine->live, true, false) > event;
+}
+
 /* Uses the prediction, if there is one, as far as it carries. */
 static Progress follow_prediction(Engine *engine, EventPolicy policy, size_t *budget, FlowEnd *end)
 {
     double event = *engine->predicted.time, target = engine->target;
     Prediction prediction = (Prediction)engine->status->prediction;
     bool quiet = prediction == PREDICTION_QUIET;
-    /* Where events are taken inside, one a little behind the target is reached with it: rounding does not decide. */
-    bool inside = prediction == PREDICTION_EVENT && (policy == EVENTS_INSIDE || policy == EVENTS_STOP_AFTER);
-    double slack = inside ? event_tolerance(event) : 4.0 * time_ulp(event);
     if (prediction == PREDICTION_NONE)
         return NOT_PREDICTED;
-    if (quiet ? target <= event : target < event - slack) {
+    if (quiet ? target <= event : target < event - 4.0 * time_ulp(event) && !reached_with(engine, policy, event)) {
         /* A hook wants to see each step, so none may go beyond the target. */
         if (engine->hook || !follow_steps(engine, target, event))
             *end = flow(engine, &engine->live, target, false, budget);

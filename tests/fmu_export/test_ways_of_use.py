@@ -276,6 +276,14 @@ def test_timer_at_the_stop_time_happens(way, library):
 
 
 @pytest.mark.parametrize("way", WAYS)
+def test_timer_just_behind_the_stop_time_has_its_own_time(way, library):
+    """8e-11 s are less than the tolerance of guards: a time event is not moved by it."""
+    points = communication_points(way, 0.0, 0.75, 3)
+    _, end = ramps(library, way, points, first=0.25, period=0.25 + 4e-11)
+    assert end["rounds"] == 2
+
+
+@pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("t_start", [0.0, 5.0, -3.0])
 def test_events_at_the_start_and_a_start_time_that_is_not_zero(way, t_start, library):
     """a and b begin at their limits and the timer is due at the start: all jump there, once, in order."""
