@@ -434,8 +434,8 @@ MUTANTS = [
     Mutant(
         "beyond the stop time",
         "stepping.c",
-        "if (target > run->stop_time + time_rounding(target, run->stop_time))",
-        "if (target > 2.0 * run->stop_time + time_rounding(target, run->stop_time))",
+        "if (target > run->stop_time + fmax(",
+        "if (target > 2.0 * run->stop_time + fmax(",
         "the stop time is kept",
         "check_step_arguments",
     ),
@@ -536,7 +536,7 @@ MUTANTS += [
             "!engine_block_is_sound(instance->engine, saved->block) || ",
             "",
         ),
-        ("any mode", " || !is_one_of(run->mode, MODE_ANY))", ")"),
+        ("any mode", " || !is_sound(run))", ")"),
         (
             "the former state is lost",
             "    free(*state);\n    *state = saved;\n    return",

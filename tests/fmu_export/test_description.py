@@ -10,7 +10,6 @@ import hybrid_model as hm
 from fmu.errors import ExportError
 from fmu.export import export_fmu
 
-
 QUICK = ("bouncing_ball", "agent2_dynamic", "thermostat", "newtons_cradle")
 """fmpy takes its time with names of many parts."""
 MODELS = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in cases()]
