@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from typing import Any
+from collections.abc import Collection, Sequence
 
-import casadi as ca
-import numpy as np
-
+from fmu.c_text import array, boolean, constant, functions, row, string
 from fmu.derivatives import derivative_functions
 from fmu.names import NameTable
 from fmu.network import NetworkTrace
@@ -16,17 +13,6 @@ from fmu.variables import FmuVariable
 from hybrid_model.layout import Layout
 from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import Kind
-
-_OPTIONS: dict[str, Any] = {
-    "with_header": False,
-    "with_export": False,
-    "cpp": False,
-    "main": False,
-    "mex": False,
-    "verbose": False,
-    "casadi_real": "double",
-    "casadi_int": "long long int",
-}
 
 
 def model_code(
@@ -59,13 +45,10 @@ def _maps(traced: Trace | NetworkTrace) -> tuple[str, Sequence[int]]:
     """Return the definitions of the maps and of their derivatives, and the sizes of the work arrays they need."""
     if isinstance(traced, NetworkTrace):
         return traced.c_code(), traced.work_sizes
-    functions = [*traced.functions, *derivative_functions(traced).values()]
-    generator = ca.CodeGenerator("model", _OPTIONS)
-    for function in functions:
-        generator.add(function)
-    resets = _array("ModelFunction ", "resets", (reset.name() for reset in traced.resets))
-    code = "\n".join([generator.dump(), '#include "model.h"', "", resets, _RESET])
-    return code, [max(getattr(f, size)() for f in functions) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
+    given = [*traced.functions, *derivative_functions(traced).values()]
+    resets = array("ModelFunction", "resets", (reset.name() for reset in traced.resets))
+    code = "\n".join([functions("model", given), '#include "model.h"', "", resets, _RESET])
+    return code, [max(getattr(f, size)() for f in given) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
 
 
 _MAPS = (
@@ -88,37 +71,19 @@ static int hybrid_reset(size_t jump, const double **arg, double **res, long long
 """
 
 
-def string(text: str) -> str:
-    """Return `text` as a C string literal of plain ASCII, whatever it contains."""
-    octets = "".join(
-        chr(byte) if 32 <= byte < 127 and byte not in b'"\\?' else f"\\{byte:03o}" for byte in text.encode("utf-8")
-    )
-    return f'"{octets}"'
-
-
-def _number(value: float) -> str:
-    return float(value).hex() if np.isfinite(value) else str(value)
-
-
-def _array(kind: str, name: str, items: Iterable[str]) -> str:
-    # C has no empty arrays: a table without entries gets one that is never read.
-    entries = list(items) or ["{0}" if kind in ("ModelJump ", "ModelVariable ", "ModelName ") else "0"]
-    return f"static const {kind}{name}[] = {{\n    " + ",\n    ".join(entries) + "\n};\n"
-
-
 def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> list[str]:
     automaton, layout, names = traced.automaton, traced.layout, NameTable()
     starts = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
     margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
     tables = [
-        *(_array("double ", f"start_{name}", map(_number, layout.start(kind))) for name, kind in starts),
-        _array("double ", "nominals", map(_number, _nominals(layout))),
-        _array("ModelName ", "state_names", map(names.entry, layout.names(Kind.STATE))),
-        _array("ModelName ", "discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
-        _array("ModelName ", "margin_names", map(names.entry, margin_names)),
-        _array("ModelJump ", "jumps", _jumps(traced, names)),
-        _array("size_t ", "clock_jump", (str(clock.jump) for clock in automaton.clocks)),
-        _array("ModelVariable ", "variables", (_variable(variable, names) for variable in variables)),
+        *(array("double", f"start_{name}", map(constant, layout.start(kind))) for name, kind in starts),
+        array("double", "nominals", map(constant, _nominals(layout))),
+        array("ModelName", "state_names", map(names.entry, layout.names(Kind.STATE))),
+        array("ModelName", "discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
+        array("ModelName", "margin_names", map(names.entry, margin_names)),
+        array("ModelJump", "jumps", _jumps(traced, names)),
+        array("size_t", "clock_jump", (str(clock.jump) for clock in automaton.clocks)),
+        array("ModelVariable", "variables", (_variable(variable, names) for variable in variables)),
     ]
     return [*tables, names.definition("names")]
 
@@ -134,15 +99,15 @@ def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
     counts = {Trigger.STATE: 0, Trigger.TIME: 0}
     for info in traced.automaton.jumps:
         kind = "JUMP_ON_STATE" if info.trigger is Trigger.STATE else "JUMP_ON_TIME"
-        rows.append(f"{{{names.entry(info.name)}, {kind}, {counts[info.trigger]}, {_bool(info.internal)}}}")
+        rows.append(row(names.entry(info.name), kind, counts[info.trigger], boolean(info.internal)))
         counts[info.trigger] += 1
     return rows
 
 
 def _variable(variable: FmuVariable, names: NameTable) -> str:
-    flags = f"{_bool(variable.discrete)}, {_bool(variable.calculated)}"
-    place = f"{names.entry(variable.name)}, {variable.index}, {variable.size}"
-    return f"{{{place}, {variable.type.value}, {variable.bank.value}, {flags}}}"
+    kind = (variable.type.value, variable.bank.value)
+    flags = map(boolean, (variable.discrete, variable.calculated))
+    return row(names.entry(variable.name), variable.index, variable.size, *kind, *flags)
 
 
 def _model(
@@ -156,8 +121,8 @@ def _model(
     fields = {
         "name": string(automaton.name),
         "token": string(token),
-        "co_simulation": _bool("cs" in kinds),
-        "model_exchange": _bool("me" in kinds),
+        "co_simulation": boolean("cs" in kinds),
+        "model_exchange": boolean("me" in kinds),
         "n_states": sizes[Kind.STATE],
         "n_discrete": sizes[Kind.DISCRETE],
         "n_inputs": sizes[Kind.INPUT],
@@ -169,16 +134,12 @@ def _model(
         "n_clocks": len(automaton.clocks),
         "n_variables": len(variables),
         **dict(zip(("n_arg", "n_res", "n_iw", "n_w"), work, strict=True)),
-        "flow_priority": _bool(automaton.priority is Priority.FLOW),
-        "has_flow_set": _bool(automaton.has_flow_set),
-        "predictable": _bool(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
+        "flow_priority": boolean(automaton.priority is Priority.FLOW),
+        "has_flow_set": boolean(automaton.has_flow_set),
+        "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
         **{name: f"hybrid_{name}" for name in _MAPS},
         **{name: name for name in ("nominals", "jumps", "clock_jump", "variables")},
         **{name: name for name in ("state_names", "discrete_names", "margin_names", "names")},
     }
     return "const Model model = {\n" + "".join(f"    .{key} = {value},\n" for key, value in fields.items()) + "};\n"
-
-
-def _bool(value: bool) -> str:
-    return "true" if value else "false"

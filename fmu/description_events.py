@@ -13,7 +13,6 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from fmu.description_jumps import changes
 from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import Kind
 
@@ -53,7 +52,7 @@ def after_jumps(traced: Any, margins: Matrix, flow_set: Matrix) -> dict[Kind, Ma
 
 def _reads(traced: Any, kind: Kind) -> Iterator[tuple[int, dict[int, AbstractSet[int]]]]:
     """Yield each jump with the elements that it changes and what their new values depend on."""
-    changed = changes(traced, kind)
+    changed = traced.changes(kind)
     if hasattr(traced, "resets"):
         for jump, reset in enumerate(traced.resets):
             rows = _reset_rows(reset, kind) if changed[jump] else []

@@ -85,25 +85,25 @@ class NetworkTrace:
         """
         return self.patterns.matrix(result, argument)
 
-    def changed_by(self, kind: Kind) -> list[frozenset[int]]:
-        """Return for each continuous or discrete state the jumps that may change it.
+    def changes(self, kind: Kind) -> list[frozenset[int]]:
+        """Return which continuous or discrete states each jump may change.
 
         Parameters
         ----------
-        kind : Kind
-            ``Kind.STATE`` or ``Kind.DISCRETE``.
+        kind : {Kind.STATE, Kind.DISCRETE}
+            Which vector.
 
         Returns
         -------
         list of frozenset of int
-            For each element of the vector numbers of jumps.
+            One a jump: elements of the vector.
         """
-        found: list[frozenset[int]] = [frozenset()] * self.layout.sizes[kind]
-        for member, number in zip(self.members.members, self.group_of, strict=True):
-            changes = self.groups[number].changed_by(kind)
-            for element, jumps in zip(member.places(kind), changes, strict=True):
-                found[element] = frozenset(member.jump + jump for jump in jumps)
-        return found
+        by_group = [group.traced.changes(kind) for group in self.groups]
+        return [
+            frozenset(member.first[kind] + element for element in elements)
+            for member, number in zip(self.members.members, self.group_of, strict=True)
+            for elements in by_group[number]
+        ]
 
     def c_code(self) -> str:
         """Return C99 that defines the functions of fmu/runtime/model.h.

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from fmu.c_text import array, boolean, constant, functions, row
 from fmu.network_groups import Group, forward, reverse, sliced
 from fmu.network_members import Members, NotLoopable
 from fmu.network_order import Call, Order, Piece
@@ -16,16 +15,6 @@ from hybrid_model.layout import Layout
 from hybrid_model.transitions import Trigger
 from hybrid_model.variables import FloatArray, Kind
 
-_OPTIONS: dict[str, Any] = {
-    "with_header": False,
-    "with_export": False,
-    "cpp": False,
-    "main": False,
-    "mex": False,
-    "verbose": False,
-    "casadi_real": "double",
-    "casadi_int": "long long int",
-}
 _SOURCE_BITS = 30
 _ARG, _RES = 10, 5
 """NETWORK_ARG and NETWORK_RES of fmu/runtime/network.h."""
@@ -84,12 +73,8 @@ class NetworkCode:
 
     def text(self) -> str:
         """Return C99 that defines ``hybrid_start``, ``hybrid_flow``, ..., ``hybrid_reset`` for the engine."""
-        generator = ca.CodeGenerator("network", _OPTIONS)
-        for function in self._functions.values():
-            generator.add(function)
-        return "\n".join(
-            [generator.dump(), "#include <math.h>", '#include "network.h"', "", *self._tables(), _wrappers()]
-        )
+        maps = functions("network", self._functions.values())
+        return "\n".join([maps, "#include <math.h>", '#include "network.h"', "", *self._tables(), _wrappers()])
 
     # Functions
 
@@ -104,7 +89,7 @@ class NetworkCode:
         self._add(function, name)
         for way, derive in (("forward", forward), ("reverse", reverse)):
             self._functions[f"{name}_{way}"] = derive(function, f"{name}_{way}")
-        return f"{{{name}, {name}_forward, {name}_reverse}}"
+        return row(name, f"{name}_forward", f"{name}_reverse")
 
     def _group(self, group: Group) -> str:
         sizes, automaton, maps = group.sizes, group.traced.automaton, group.maps
@@ -125,18 +110,18 @@ class NetworkCode:
         plain = [self._add(maps[key], f"{name}_{key}") if used else "NULL" for key, used in wanted.items()]
         for k in range(len(triggers)):
             self._add(maps[f"reset{k}"], f"{name}_reset{k}")
-        flags = [_bool(group.starts), _bool(automaton.has_flow_set)]
+        flags = [boolean(group.starts), boolean(automaton.has_flow_set)]
         resets = f"{name}_resets" if triggers else "NULL"
-        return f"{{{', '.join([*map(str, numbers), *flags, *derived, *plain, resets])}}}"
+        return row(*numbers, *flags, *derived, *plain, resets)
 
     def _piece(self, number: int, piece: Piece) -> str:
         function = self._groups[piece.group].maps["outputs"]
         if piece.count == function.size1_out(0):
             name = f"group{piece.group}_outputs"
-            row = f"{{{name}, {name}_forward, {name}_reverse}}"
+            maps = row(name, f"{name}_forward", f"{name}_reverse")
         else:
-            row = self._map(sliced(function, piece.first, piece.count, f"piece{number}"), f"piece{number}")
-        return f"{{{piece.first}, {piece.count}, {row}}}"
+            maps = self._map(sliced(function, piece.first, piece.count, f"piece{number}"), f"piece{number}")
+        return row(piece.first, piece.count, maps)
 
     # Tables
 
@@ -150,20 +135,20 @@ class NetworkCode:
         )
         owners = (number for number, member in enumerate(members.members) for _ in member.automaton.jumps)
         resets = (
-            _array("ModelFunction ", f"group{group.number}_resets", names)
+            array("ModelFunction", f"group{group.number}_resets", names)
             for group in self._groups
             if (names := [f"group{group.number}_reset{k}" for k in range(len(group.traced.automaton.jumps))])
         )
         return [
             *resets,
-            _array("NetworkGroup ", "network_groups", self._group_rows),
-            _array("NetworkPiece ", "network_pieces", self._piece_rows),
-            _array("NetworkMember ", "network_members", self._member_rows()),
-            _array("NetworkCall ", "network_calls", map(self._call, order.calls)),
-            _array("NetworkCall ", "network_start_calls", map(self._call, order.start)),
-            _array("uint32_t ", "network_sources", (f"{source}u" for source in sources)),
-            _array("uint32_t ", "network_jump_member", map(str, owners)),
-            _array("double ", "network_constants", map(_number, self._constants().ravel())),
+            array("NetworkGroup", "network_groups", self._group_rows),
+            array("NetworkPiece", "network_pieces", self._piece_rows),
+            array("NetworkMember", "network_members", self._member_rows()),
+            array("NetworkCall", "network_calls", map(self._call, order.calls)),
+            array("NetworkCall", "network_start_calls", map(self._call, order.start)),
+            array("uint32_t", "network_sources", (f"{source}u" for source in sources)),
+            array("uint32_t", "network_jump_member", map(str, owners)),
+            array("double", "network_constants", map(constant, self._constants().ravel())),
             self._network(),
         ]
 
@@ -179,14 +164,14 @@ class NetworkCode:
                 place[number] = first
                 first += group.constants.shape[1]
         kinds = (Kind.STATE, Kind.DISCRETE, Kind.PARAMETER, Kind.OUTPUT)
-        for number, member in enumerate(self._members.members):
+        for k, member in enumerate(self._members.members):
             at = [member.first[kind] for kind in kinds]
-            row = [self._group_of[number], *at, member.margin, member.time, member.jump, member.first[Kind.INPUT]]
-            yield f"{{{', '.join(map(str, [*row, place[number]]))}}}"
+            first_of = (member.margin, member.time, member.jump, member.first[Kind.INPUT])
+            yield row(self._group_of[k], *at, *first_of, place[k])
 
     def _call(self, call: Call) -> str:
         piece = _START if call.piece is None else str(self._numbers[call.piece])
-        return f"{{{piece}, {call.member}}}"
+        return row(piece, call.member)
 
     @property
     def _numbers(self) -> dict[Piece, int]:
@@ -234,19 +219,3 @@ def _wrappers() -> str:
         "",
     ]
     return "\n".join(lines)
-
-
-def _array(kind: str, name: str, items: Iterable[str]) -> str:
-    # C has no empty arrays: a table without entries gets one that is never read.
-    entries = list(items) or ["{0}" if kind.startswith("Network") else "0"]
-    return f"static const {kind}{name}[] = {{\n    " + ",\n    ".join(entries) + "\n};\n"
-
-
-def _number(value: float) -> str:
-    if math.isnan(value):
-        return "NAN"
-    return float(value).hex() if math.isfinite(value) else ("INFINITY" if value > 0 else "-INFINITY")
-
-
-def _bool(value: bool) -> str:
-    return "true" if value else "false"

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from fmu.trace import Trace
+from fmu.trace import Trace, changed
 from hybrid_model.variables import FloatArray, Kind
 
 Structure = tuple[object, ...]
@@ -59,24 +59,7 @@ class Group:
 
     def changes(self, name: str, kind: Kind) -> bool:
         """Whether a map that gives new states changes those of a kind."""
-        return bool(self._changed(name, kind))
-
-    def changed_by(self, kind: Kind) -> list[frozenset[int]]:
-        """Return for each element of a kind the jumps that may change it."""
-        changed = [self._changed(f"reset{k}", kind) for k in range(len(self.traced.resets))]
-        return [
-            frozenset(k for k, elements in enumerate(changed) if element in elements)
-            for element in range(self.sizes[kind])
-        ]
-
-    @functools.cache  # noqa: B019 - groups live as long as their network
-    def _changed(self, name: str, kind: Kind) -> frozenset[int]:
-        """Elements of a kind that a map does not give back as they were."""
-        function = self.maps[name]
-        symbols = [ca.SX.sym(argument, function.size1_in(k)) for k, argument in enumerate((*_ARGUMENTS, "c"))]
-        number = (Kind.STATE, Kind.DISCRETE).index(kind)
-        new, old = function.call(symbols)[number], symbols[number + 1]
-        return frozenset(k for k in range(old.numel()) if not ca.is_equal(new[k], old[k], 2))
+        return bool(changed(self.maps[name], kind))
 
     @functools.cache  # noqa: B019 - groups live as long as their network
     def rows(self, name: str, result: int, argument: int) -> tuple[tuple[int, ...], ...]:

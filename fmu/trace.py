@@ -79,6 +79,37 @@ class Trace:
         shape = (function.size1_out(row), function.size1_in(ARGUMENTS.index(argument)))
         return sparse.csr_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=shape)
 
+    def changes(self, kind: Kind) -> list[frozenset[int]]:
+        """Return which continuous or discrete states each jump may change.
+
+        Parameters
+        ----------
+        kind : {Kind.STATE, Kind.DISCRETE}
+            Which vector.
+
+        Returns
+        -------
+        list of frozenset of int
+            One a jump: elements of the vector.
+        """
+        return [changed(reset, kind) for reset in self.resets]
+
+
+def changed(function: ca.Function, kind: Kind) -> frozenset[int]:
+    """Return the elements of the new states, continuous or discrete, that a traced map does not give back as they were.
+
+    Parameters
+    ----------
+    function : casadi.Function
+        Of t, x, z, ...; with results x+ and z+.
+    kind : {Kind.STATE, Kind.DISCRETE}
+        Which of them.
+    """
+    result = (Kind.STATE, Kind.DISCRETE).index(kind)
+    arguments = function.sx_in()
+    after, before = function.call(arguments)[result], arguments[1 + result]
+    return frozenset(k for k in range(before.numel()) if not ca.is_equal(after[k], before[k], 0))
+
 
 def trace(automaton: Automaton) -> Trace:
     """Trace the maps of an automaton.
