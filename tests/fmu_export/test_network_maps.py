@@ -43,10 +43,12 @@ class Compiled:
         )
         source.write_text(traced.c_code() + "".join(calls), encoding="ascii")
         common = [*find_compiler(), "-std=c99", "-O1", "-fPIC", "-ffp-contract=off", f"-I{RUNTIME}"]
-        generated, runtime, library = folder / "model.o", folder / "network.o", folder / "model.so"
+        generated, library = folder / "model.o", folder / "model.so"
         subprocess.run([*common, *GENERATED_FLAGS, "-Werror", "-c", source, "-o", generated], check=True)
-        subprocess.run([*common, *STRICT_FLAGS, "-c", RUNTIME / "network.c", "-o", runtime], check=True)
-        subprocess.run([*common, "-shared", generated, runtime, "-lm", "-o", library], check=True)
+        runtime = [folder / f"{source.stem}.o" for source in RUNTIME.glob("network*.c")]
+        for target in runtime:
+            subprocess.run([*common, *STRICT_FLAGS, "-c", RUNTIME / f"{target.stem}.c", "-o", target], check=True)
+        subprocess.run([*common, "-shared", generated, *runtime, "-lm", "-o", library], check=True)
         self.library = ctypes.CDLL(str(library))
         self.sizes = traced.work_sizes
         self.size = library.stat().st_size
