@@ -183,6 +183,10 @@ class Exchange:
     def settle(self):
         """Event Mode to its end; the state is read anew."""
         _, self.next = self.instance.iterate("continuous")
+        self.read_states()
+
+    def read_states(self):
+        """What the integration goes on from."""
         self.x = np.array(self.instance.vector("states", self.n)) if self.n else self.x
 
     def advance(self, point):

@@ -85,6 +85,8 @@ class Importer(RuleBasedStateMachine):
         if to is not None:
             if call == "reset":
                 self.k = 0
+            if to == "continuous":
+                self.exchange.read_states()
             self.mode = to
 
     def settle(self):
