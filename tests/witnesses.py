@@ -167,6 +167,26 @@ class FlowFirst(hm.HybridAutomaton):
         return {"x": np.clip(s.x, 0.0, 1.0), "direction": -s.direction, "turns": s.turns + 1}
 
 
+class PatientBall(hm.HybridAutomaton):
+    """A ball with flow priority: flow set and jump set share the floor as their border."""
+
+    h = hm.State(1.0, output=True)
+    v = hm.State(0.0, output=True)
+    priority = hm.Priority.FLOW
+
+    def flow_map(self, s):
+        return {"h": s.v, "v": -9.81}
+
+    def flow_set(self, s):
+        return s.h
+
+    def jump_set(self, s):
+        return hm.least(-s.h, -s.v)
+
+    def jump_map(self, s):
+        return {"h": 0.0, "v": -0.8 * s.v}
+
+
 class Mix(hm.HybridAutomaton):
     """Everything at once, for random parameters: two driven states, two guards, a timer, a breakpoint, an input.
 

@@ -53,7 +53,12 @@ Answer instance_set_clocks(void *handle, const char *function, const Reference r
 {
     Instance *instance = enter(handle, function, MODE_EVENT);
     /* The event is due by its own time: the tick tells nothing new, and one that comes early does nothing. */
-    return instance ? check_countdowns(instance, function, references, n, active) : ANSWER_ERROR;
+    if (!instance || check_countdowns(instance, function, references, n, active) != ANSWER_OK)
+        return ANSWER_ERROR;
+    for (size_t i = 0; i < n; i++)
+        if (active[i])
+            instance->run->interval_owed = false;
+    return ANSWER_OK;
 }
 
 Answer instance_get_interval(void *handle, const char *function, const Reference references[], size_t n,
@@ -68,5 +73,7 @@ Answer instance_get_interval(void *handle, const char *function, const Reference
     *qualifier = !known ? INTERVAL_NOT_YET_KNOWN : run->interval_told ? INTERVAL_UNCHANGED : INTERVAL_CHANGED;
     if (n > 0)
         run->interval_told = known;
+    if (n > 0 && known)
+        run->interval_owed = true;
     return ANSWER_OK;
 }

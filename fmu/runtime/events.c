@@ -64,7 +64,9 @@ Answer instance_update(void *handle, const char *function, EventUpdate *update)
     update->has_next = settled && next_event(instance, &update->next);
     if (!update->has_next)
         update->next = 0.0;
-    run->next_event = update->has_next && engine_foresees(engine) ? update->next : INFINITY;
+    /* A countdown that has begun cannot be called off: without an event it ends where nothing happens. */
+    bool counts = update->has_next && (engine_foresees(engine) || run->interval_owed);
+    run->next_event = counts ? update->next : (double)INFINITY;
     run->interval_told = false;
     if (update->terminate)
         refuse(instance, "%s: %s", instance->name, engine_message(engine));

@@ -45,6 +45,7 @@ typedef struct {
     int32_t end_reported;      /* a step has said that the run is over */
     int32_t stop_at_events;    /* the option of that name */
     int32_t interval_told;     /* the countdown clock's interval has been asked for since it changed */
+    int32_t interval_owed;     /* it has been told and the clock has not ticked since: it must remain known */
     double next_event;         /* the time of the countdown clock's next tick, infinite if there is none */
 } Run;
 

@@ -78,13 +78,14 @@ static FlowEnd leave_flow_set(Search *search, double t)
     return FLOW_PROBLEM;
 }
 
-bool raise_levels(Engine *engine, const Point *point, double t)
+/* Guards that are crossed within the tolerance after t count as crossed. */
+static bool raise_guards(Engine *engine, const Point *point, double t)
 {
     const Model *m = engine->model;
     Search search = {.engine = engine, .point = point, .level = 0.0, .piece_end = t,
                      .n_rows = m->n_margins + 1, .exit_row = m->n_margins, .failed = false};
     double *now = engine->samples, *then = engine->samples + search.n_rows;
-    if (m->n_margins == 0 || m->flow_priority)
+    if (m->n_margins == 0)
         return true;
     if (!look(&search, ON_STEP, t, now) || !look(&search, ON_STEP, t + event_tolerance(t), then))
         return false;
@@ -94,11 +95,16 @@ bool raise_levels(Engine *engine, const Point *point, double t)
     return true;
 }
 
+bool raise_levels(Engine *engine, const Point *point, double t)
+{
+    return engine->model->flow_priority || raise_guards(engine, point, t);
+}
+
 bool raise_levels_here(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
     double now, later, soon = *point->time + event_tolerance(*point->time);
-    if (!step_begin(engine, point) || !raise_levels(engine, point, *point->time))
+    if (!step_begin(engine, point) || !raise_guards(engine, point, *point->time))
         return false;
     if (!m->flow_priority || !m->has_flow_set)
         return true;

@@ -140,6 +140,21 @@ class Bounds:
         parts = self.parts or ()
         return tuple((c, decay) for c, decay in parts if decay == min(b for _, b in parts))
 
+    @property
+    def passing_radii(self) -> tuple[tuple[float, float], ...]:
+        """Pairs (R, b): the parts of the errors that decay faster than the slowest add at most ``R exp(-b t)``."""
+        found = []
+        for c, decay in self.parts or ():
+            if (c, decay) in self.slowest:
+                continue
+            # Beyond the rate no radius exists; the same part is also below one that decays half as fast as the rate.
+            worst = self._worst(decay)
+            carrier = decay if worst is not None else 0.5 * (self.floquet_rate or 0.0)
+            worst = worst or self._worst(carrier)
+            if worst is not None:
+                found.append((c * worst.radius * worst.cover, carrier))
+        return tuple(found)
+
     # --- radius ------------------------------------------------------------------------------------------------------
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from hybrid_model import HybridArc
+from hybrid_model import HybridArc, Stop
 from hybrid_model.consensus.analysis import analyse, connected_parts
 from hybrid_model.consensus.bounds import Bounds
 from hybrid_model.consensus.certified import FORMS, Certified, certified_values
@@ -98,7 +98,7 @@ def certify(
     bounds = Bounds(analysis)
     # Where no radius exists, there is nothing to compare an observed one with.
     decay = None if bounds.exact_radius is None else min((beta for _, beta in bounds.slowest), default=0.0)
-    seen = None if arc is None else observe(analysis, arc, decay)
+    seen = None if arc is None else observe(analysis, arc, decay, bounds.passing_radii)
     values = certified_values(bounds, seen)
     further = bound_hypotheses(bounds)
     # What the bounds show takes the place of what was known without them.
@@ -110,7 +110,7 @@ def certify(
         values,
         hypotheses,
         {"mu1": constants.mu1, "mu2": constants.mu2, "T": constants.window},
-        tuple(scenario_notes(bounds, hypotheses, seen)),
+        (*scenario_notes(bounds, hypotheses, seen), *_early_end(arc)),
         analysis.tree.tree,
     )
 
@@ -159,8 +159,16 @@ def _in_parts(
             unit = {"rate": "1/s", "radius": "unit of x", "min_gap": "s", "transient": "1"}[quantity]
             values.append(Certified(quantity, form, value, unit, "", ("connected union",)))
     notes += [f"Hypothesis '{h.name}' fails: {h.detail}" for h in hypotheses[1:] if not h.holds]
+    notes += _early_end(arc)
     empty: dict[str, float | None] = {"mu1": 0.0, "mu2": None, "T": cycle}
     return Certificates(scenario, tuple(values), tuple(hypotheses), empty, tuple(notes))
+
+
+def _early_end(arc: HybridArc | None) -> list[str]:
+    """A sentence on a run that did not reach its stop time; what was observed is of that part only."""
+    if arc is None or arc.stop is Stop.HORIZON:
+        return []
+    return [f"The run ended before the stop time, so what is observed is of its beginning only: {arc.message}"]
 
 
 def _positive_edges(scenario: Scenario, cycle: float) -> list[tuple[int, int]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +16,10 @@ from hybrid_model.consensus.report import edge_norm, run_report
 from hybrid_model.consensus.scenario_data import Scenario
 from hybrid_model.consensus.trigger_data import TriggerKind
 
-__all__ = ["TIME_TOLERANCE", "Observation", "observe"]
+__all__ = ["Observation", "observe"]
 
 _STATE_TOLERANCE = 1e-10
 """States of a run are trusted to this, measured by the disagreement at the start (audit, section 10)."""
-
-TIME_TOLERANCE = 1e-8
-"""Event times [s] are ill-conditioned where a weight is near zero; they are trusted to this (audit, section 10)."""
 
 
 @dataclass(frozen=True)
@@ -31,13 +29,13 @@ class Observation:
     Attributes
     ----------
     min_gap : float or None
-        Shortest time [s] between two broadcasts of one agent; None if no agent broadcast twice. It is less the
-        numerical tolerance of two event times, but for sampled checks and periodic broadcasts: those are at known
-        times, so there it is the whole number of periods that it stands for.
+        Shortest time [s] between two broadcasts of one agent; None if no agent broadcast twice. Sampled checks and
+        periodic broadcasts are at known times, so there it is the whole number of periods that it stands for.
     radius : float or None
         Largest ``exp(beta t) (||x_e(t)|| - ||x_e(t) without errors||)`` over the last cycle: what is left once the
-        share of the initial state and the numerical tolerance of states are taken off. Never above the exact worst
-        case. None without a network that reaches consensus, or a bound on the errors.
+        share of the initial state, that of thresholds which decay faster (of the mixed law) and the numerical
+        tolerance of states are taken off. Never above the exact worst case. None without a network that reaches
+        consensus, or a bound on the errors.
     initial_share : float or None
         Largest ``exp(beta t) ||x_e(t) without errors||`` over the last cycle.
     end : float
@@ -56,7 +54,9 @@ class Observation:
     x_end: tuple[float, ...]
 
 
-def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observation:
+def observe(
+    analysis: Analysis, arc: HybridArc, decay: float | None, faster: Sequence[tuple[float, float]] = ()
+) -> Observation:
     """Take the figures from the run of a scenario's closed loop.
 
     Parameters
@@ -67,6 +67,8 @@ def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observat
         The run of ``closed_loop(scenario)``.
     decay : float or None
         beta [1/s] of the slowest part of the bound on the errors; None if there is no bound, and then no radius.
+    faster : sequence of (radius, decay)
+        Of the parts that decay faster: what they add to ``||x_e(t)||`` is at most ``radius exp(-decay t)``.
     """
     scenario = analysis.scenario
     report = run_report(scenario, arc)
@@ -80,14 +82,15 @@ def observe(analysis: Analysis, arc: HybridArc, decay: float | None) -> Observat
     growth = np.exp(decay * times)
     share = edge_norm(scenario, free) * growth
     rounding = _STATE_TOLERANCE * edge_norm(scenario, np.asarray(scenario.network.initial)) * growth
-    forced = max(0.0, float(np.max(edge_norm(scenario, states) * growth - share - rounding)))
+    passing = sum((radius * np.exp((decay - rate) * times) for radius, rate in faster), np.zeros_like(times))
+    forced = max(0.0, float(np.max(edge_norm(scenario, states) * growth - share - passing - rounding)))
     return Observation(shortest, forced, float(np.max(share)), *shown)
 
 
 def _shortest(scenario: Scenario, gap: float) -> float:
     if scenario.trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC):
         return round(gap / scenario.trigger.period) * scenario.trigger.period
-    return gap - 2 * TIME_TOLERANCE
+    return gap
 
 
 def undisturbed(analysis: Analysis, end: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -14,7 +14,12 @@ from hybrid_model.consensus.scenario_data import Scenario
 
 __all__ = ["WorstCase", "starting_directions", "worst_case"]
 
-_STARTS = 48
+_STARTS, _MOST_STARTS = 6, 1024
+"""Random directions: the first, doubled for each agent, but no more than the second."""
+
+_PATIENCE = 3
+_KEPT = 12
+_MOST_SECOND = 50
 _FEW = 8
 _COARSE = 0.05
 _FEW_CELLS = 1500
@@ -93,20 +98,25 @@ def worst_case(
     peaks = {k: _refine(coarse, times, k, _length(coarse, rough[k][1]))[0] for k in promising}
     finalists = sorted(promising, key=lambda place: -peaks[place])[:_FINALISTS]
     pool = np.hstack([starts, *(rough[place][1] for place in finalists)])
-    trials = {place: coarse.radius(int(indices[place]), pool) for place in finalists}
-    tried = {place: _refine(fine, times, place, _length(fine, trials[place][1])) for place in finalists}
+    trials = [coarse.radius(int(indices[place]), pool, _ROUGH, _PATIENCE)[1][:, :_KEPT] for place in finalists]
+    # What is found from everywhere at the best times is tried at the others.
+    pool = np.hstack(trials)
+    second = sorted(rough, key=lambda place: -rough[place][0])[:_MOST_SECOND]
+    again = {place: coarse.radius(int(indices[place]), pool, _ROUGH) for place in second}
+    finalists = sorted(second, key=lambda place: -again[place][0])[:_FINALISTS]
+    tried = {place: _refine(fine, times, place, _length(fine, again[place][1])) for place in finalists}
     radius, time = max(tried.values())
     threshold = scenario.trigger.threshold if threshold is None else threshold
     found = {}
     for column, pair in enumerate(network.edges):
         along = pairs[:, column : column + 1]
-        width, _ = _refine(fine, times, int(np.argmax(widths[:, column])), _width(fine, along))
-        found[pair] = threshold * width
+        places = np.argsort(-widths[:, column])[:_FINALISTS].tolist()
+        found[pair] = threshold * max(_refine(fine, times, place, _width(fine, along))[0] for place in places)
     return WorstCase(threshold * radius, found, time, fine.resolution)
 
 
 def _length(sets: ReachableSets, direction: NDArray[np.float64]) -> Callable[[int], float]:
-    return lambda index: sets.radius(index, direction)[0]
+    return lambda index: sets.radius(index, direction[:, :1])[0]
 
 
 def _width(sets: ReachableSets, along: NDArray[np.float64]) -> Callable[[int], float]:
@@ -138,6 +148,8 @@ def starting_directions(agents: int) -> NDArray[np.float64]:
     """Directions, shape (n - 1, count), from which extreme points are searched: pairs of agents, and random ones."""
     basis = disagreement_basis(agents)
     pairs = [basis[i] - basis[j] for i in range(agents) for j in range(i)]
-    random = np.random.default_rng(2018).standard_normal((_STARTS, agents - 1))
+    # The number of local maxima grows about so with the number of agents.
+    count = min(_MOST_STARTS, _STARTS * 2 ** min(agents, 10))
+    random = np.random.default_rng(2018).standard_normal((count, agents - 1))
     ordered = [*random[:_FEW], *pairs, *random[_FEW:]]
     return np.stack(ordered, axis=1)

@@ -109,6 +109,14 @@ def test_errors_reach_the_exact_radius_and_no_more(weights):
     assert share > 1 - FOUND
 
 
+@pytest.mark.parametrize(("weights", "seed"), [("sine", 104), ("piecewise", 101)])
+def test_the_farthest_of_many_local_maxima_is_found(weights, seed):
+    """Six agents: some forty maxima over directions; and widths of pairs that are largest at several times."""
+    share = search(seed, weights, 6, times=4, starts=20)
+    assert share is not None
+    assert share > 1 - FOUND
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("weights", WEIGHTS)
 def test_no_search_finds_errors_beyond_the_exact_radius(weights):

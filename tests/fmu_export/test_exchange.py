@@ -9,7 +9,7 @@ from fmu_driver2 import DISCARD, ERROR, OK, Binary, Component, doubles
 from fmu_driver_exchange import STEP, Exchange
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from witnesses import Mix, Ramps, Timers
+from witnesses import Mix, PatientBall, Ramps, Timers
 from witnesses_ends import Agreed, Pole, Stuck
 
 import hybrid_model as hm
@@ -21,7 +21,7 @@ VERSIONS = pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 
 
 MODELS = {"mix": Mix, "ramps": Ramps, "timers": Timers, "ball": BouncingBall, "stuck": Stuck, "agreed": Agreed,
-          "pole": Pole}  # fmt: skip
+          "pole": Pole, "patient": PatientBall}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -58,6 +58,20 @@ def test_a_run_with_everything_is_that_of_the_automaton(fmi, short, make):
     for t, x in record.samples:
         np.testing.assert_allclose(x, arc.at("x", t), rtol=0, atol=STATE_TOLERANCE)
     assert component.errors == []
+    component.free()
+
+
+@VERSIONS
+@pytest.mark.parametrize("ahead, n", [(1e-6, 0), (1e-8, 0), (5e-10, 1), (1e-15, 1)])
+def test_where_flow_has_priority_a_border_of_both_sets_is_reached_a_little_before_it(fmi, ahead, n, make):
+    component = make("patient", fmi)
+    component.begin()
+    t = np.sqrt(2.0 / 9.81) - ahead
+    component.do("SetTime", c.c_double(t))
+    component.do("SetContinuousStates", doubles([1.0 - 9.81 / 2 * t**2, -9.81 * t]), c.c_size_t(2))
+    component.do("EnterEventMode")
+    component.settle()
+    assert len(component.jumps) == n
     component.free()
 
 
