@@ -70,9 +70,24 @@ def test_a_disconnected_union_is_null_and_said(scenario, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["rate"]["floquet"] is None
     assert found["radius"]["exact"] is None
+    assert "Hypothesis 'connected union' fails" in found["notes"][0]
     assert "{1, 2} and {3}" in found["notes"][0]
 
 
 def test_an_unknown_preset_is_wrong_usage(capsys):
     assert main(["certify", "nowhere"]) == 2
     assert "no preset 'nowhere'" in capsys.readouterr().err
+
+
+def test_thresholds_that_vanish_too_fast_are_named_and_cut_the_run(scenario, capsys):
+    """beta = 3/s above the rate 1/s: events grow ever denser, and the bounds that are left are given all the same."""
+    path = scenario(kind="dynamic", more="decay = 3.0")
+    assert main(["certify", path, "--json", "--max-jumps", "500"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["radius"]["exact"] is None
+    assert found["rate"]["floquet"] == pytest.approx(1.0, rel=1e-9)
+    notes = " ".join(found["notes"])
+    assert "beta below the Floquet rate' fails" in notes
+    assert "The run ended before the stop time" in notes
+    assert main(["certify", path, "--max-jumps", "0"]) == 2
+    assert "--max-jumps 0: give a whole number of jumps, 1 or more." in capsys.readouterr().err

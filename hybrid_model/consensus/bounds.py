@@ -23,7 +23,7 @@ from hybrid_model.consensus.worst_case import WorstCase
 
 __all__ = ["Bounds", "with_threshold"]
 
-_LEAST_FORGOTTEN = 1.5e-3
+_LEAST_FORGOTTEN = 1e-7
 """``(r - beta) C`` below which more cycles C count than `ReachableSets` adds up."""
 
 

@@ -119,7 +119,10 @@ def _in_parts(
     scenario: Scenario, arc: HybridArc | None, hypotheses: list[Hypothesis], cycle: float, resolution: float
 ) -> Certificates:
     """No consensus of all: what holds for each part by itself."""
-    notes = [hypotheses[0].detail + " There is no consensus of all agents; each part keeps its own mean."]
+    notes = [
+        f"Hypothesis '{hypotheses[0].name}' fails: {hypotheses[0].detail} There is no consensus of all agents; each part "
+        "keeps its own mean."
+    ]
     gaps: dict[str, list[float | None]] = {"valid": [], "improved": []}
     touched = {agent for edge in _positive_edges(scenario, cycle) for agent in edge}
     for part, alone in part_scenarios(scenario, cycle):

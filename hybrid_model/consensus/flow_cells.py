@@ -13,7 +13,7 @@ from hybrid_model.consensus.edge_weights import Piece
 from hybrid_model.consensus.excitation import Signal, signal_factor
 from hybrid_model.consensus.scenario_data import Scenario
 
-__all__ = ["FlowCells", "affordable_resolution", "flow_cells"]
+__all__ = ["FlowCells", "affordable_resolution", "dose_between", "flow_cells"]
 
 _MOST_PER_PIECE = 100_000
 _MOST_BLOCKS = 256
@@ -141,9 +141,13 @@ def flow_cells(
 
 def affordable_resolution(scenario: Scenario, t0: float, t1: float, resolution: float, most: int) -> float:
     """`resolution`, or what leaves about `most` cells between `t0` and `t1` [s] if the weights are so large."""
+    return max(resolution, dose_between(scenario, t0, t1) / most)
+
+
+def dose_between(scenario: Scenario, t0: float, t1: float) -> float:
+    """``k ||int N||`` over each piece between `t0` and `t1` [s], added up."""
     factor, gain = signal_factor(scenario, Signal.DISAGREEMENT), scenario.network.gain
-    spent = sum(_spent(piece, gain, factor) for piece in scenario.edge_weights.pieces(t0, t1) if not piece.is_idle)
-    return max(resolution, spent / most)
+    return sum(_spent(piece, gain, factor) for piece in scenario.edge_weights.pieces(t0, t1) if not piece.is_idle)
 
 
 def _spent(piece: Piece, gain: float, factor: NDArray[np.float64]) -> float:

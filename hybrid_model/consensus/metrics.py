@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -254,7 +254,8 @@ def settling_time(
 
 
 def run_metrics(scenario: Scenario, arc: HybridArc, level: float | None = None) -> dict[str, Any]:
-    """All metrics of a run of ``closed_loop(scenario)`` as one object for JSON."""
+    """All metrics of a run of ``closed_loop(scenario)`` as one object for JSON; of its part if it ended early."""
+    scenario = replace(scenario, stop_time=float(arc.t[-1]))
     times = run_report(scenario, arc).event_times
     sent, gaps = communication(scenario, times), gap_statistics(times)
     judged = performance(scenario, run_states(scenario, arc), times, level)
@@ -262,6 +263,7 @@ def run_metrics(scenario: Scenario, arc: HybridArc, level: float | None = None) 
         "broadcasts": sent.broadcasts,
         "link_messages": sent.link_messages,
         "active_messages": sent.active_messages,
+        "duration": sent.duration,
         "rate": sent.rate,
         "gaps": {
             "count": gaps.count,

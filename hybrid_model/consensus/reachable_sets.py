@@ -30,7 +30,7 @@ _APART = 0.5
 
 _STALLED = 1e-10
 _TAIL = 1e-11
-_MOST_CYCLES = 10_000_000
+_MOST_CYCLES = 1_000_000_000
 _LOST = 0.1
 """What may be lost by taking periods together, as a share and with the square root of the tail: 3e-7 for the finest."""
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid_model.consensus.flow_cells import dose_between
 from hybrid_model.consensus.graphs import disagreement_basis
 from hybrid_model.consensus.reachable_sets import ReachableSets
 from hybrid_model.consensus.scenario_data import Scenario
@@ -75,6 +76,9 @@ def worst_case(
     fine grid. A maximum is reached from below, so a narrower one that the search misses would make the number small.
     """
     network = scenario.network
+    if periodic and scenario.edge_weights.period == 0.0:
+        # Any period will do for constant weights: one in which the fastest mode is seen, however slow the others are.
+        period = min(period, 1 / dose_between(scenario, 0.0, 1.0))
     coarse = ReachableSets(scenario, period, decay, max(resolution, _COARSE), periodic=periodic, most=_FEW_CELLS)
     fine = coarse
     if resolution < coarse.resolution:

@@ -201,3 +201,13 @@ def test_metrics_of_the_papers_run_as_one_object():
     assert found["gaps"]["min"] == pytest.approx(0.106236, abs=5e-7)
     assert found["rate"] == pytest.approx(25 / 4 / 50)
     assert found["settling"]["time"] is None
+
+
+def test_metrics_of_a_run_that_ended_early_are_of_its_part():
+    scenario = pair({"kind": "dynamic", "threshold": 0.1, "decay": 5.0})
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=hm.ZenoGuard(max_jumps=40))
+    assert arc.stop is hm.Stop.JUMPS
+    found = run_metrics(scenario, arc)
+    assert found["duration"] == arc.t[-1] < scenario.stop_time
+    assert found["rate"] == sum(found["broadcasts"]) / 2 / found["duration"]
+    assert found["integral"] > 0

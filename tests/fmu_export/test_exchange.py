@@ -62,7 +62,7 @@ def test_a_run_with_everything_is_that_of_the_automaton(fmi, short, make):
 
 
 @VERSIONS
-@pytest.mark.parametrize("ahead, n", [(1e-6, 0), (1e-8, 0), (5e-10, 1), (1e-15, 1)])
+@pytest.mark.parametrize(("ahead", "n"), [(1e-6, 0), (1e-8, 0), (5e-10, 1), (1e-15, 1)])
 def test_where_flow_has_priority_a_border_of_both_sets_is_reached_a_little_before_it(fmi, ahead, n, make):
     component = make("patient", fmi)
     component.begin()
