@@ -43,7 +43,7 @@ def add_parser(commands: Any) -> None:
         metavar="N",
         type=int,
         default=_MOST_JUMPS,
-        help="jumps after which the run beside the bounds ends, broadcasts and breakpoints together (default %(default)s)",
+        help="jumps (broadcasts and breakpoints) after which the run beside the bounds ends (default %(default)s)",
     )
     parser.set_defaults(run=run)
 

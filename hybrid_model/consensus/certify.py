@@ -119,10 +119,9 @@ def _in_parts(
     scenario: Scenario, arc: HybridArc | None, hypotheses: list[Hypothesis], cycle: float, resolution: float
 ) -> Certificates:
     """No consensus of all: what holds for each part by itself."""
-    notes = [
-        f"Hypothesis '{hypotheses[0].name}' fails: {hypotheses[0].detail} There is no consensus of all agents; each part "
-        "keeps its own mean."
-    ]
+    broken = hypotheses[0]
+    left = "There is no consensus of all agents; each part keeps its own mean."
+    notes = [f"Hypothesis '{broken.name}' fails: {broken.detail} {left}"]
     gaps: dict[str, list[float | None]] = {"valid": [], "improved": []}
     touched = {agent for edge in _positive_edges(scenario, cycle) for agent in edge}
     for part, alone in part_scenarios(scenario, cycle):
