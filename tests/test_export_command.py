@@ -29,6 +29,13 @@ slow = Decay(rate=0.5)
 '''
 
 
+DATA = """
+@dataclass
+class Limits:
+    low: "float" = 0.0
+"""
+
+
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     """A folder with a module of the user's, who works in it."""
@@ -66,6 +73,19 @@ def test_an_instance_brings_its_values(here):
     assert main(["export", "fading:slow", "--out", "out"]) == 0
     assert 'start="0.5"' in description(here / "out" / "Decay.fmu")
     assert main(["export", "fading:slow", "--start-value", "rate=3", "--out", "out"]) == 2
+
+
+def test_a_class_is_found_in_a_file_anywhere(here, tmp_path_factory, capsys):
+    """Also one that is named as a module in use, and that imports what lies beside it."""
+    folder = tmp_path_factory.mktemp("a folder")
+    (folder / "beside.py").write_text(MODEL)
+    (folder / "fmu.py").write_text("from dataclasses import dataclass\nfrom beside import Decay, slow\n" + DATA)
+    before = list(sys.path), sys.modules["fmu"]
+    assert main(["export", f"{folder / 'fmu.py'}:Decay", "--start-value", "rate=0.25", "--out", "out"]) == 0
+    assert 'start="0.25"' in description(here / "out" / "Decay.fmu")
+    assert (list(sys.path), sys.modules["fmu"]) == before
+    assert main(["export", f"{folder / 'missing.py'}:Decay", "--out", "out"]) == 2
+    assert "there is no file" in capsys.readouterr().err
 
 
 def test_start_values_and_the_proposed_stop_time_are_written(here):

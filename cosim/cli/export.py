@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import importlib.util
 import math
 import os
 import re
@@ -11,7 +12,9 @@ import sys
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.machinery import ModuleSpec, SourceFileLoader
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from cosim.cli.exits import Exit, UsageError, progress, start_values
@@ -26,6 +29,7 @@ from hybrid_model.consensus.scenario import load_scenario
 
 KINDS = ("cs", "me")
 ALL = "all"
+_SOURCE = ".py"
 
 
 def add_parser(commands: Any) -> None:
@@ -36,7 +40,11 @@ def add_parser(commands: Any) -> None:
         description="Write an automaton, or each agent of a scenario, as a native FMU. Prints the files written.",
         allow_abbrev=False,
     )
-    parser.add_argument("target", metavar="TARGET", help="module:ClassName, name of a preset, or path of a TOML file")
+    parser.add_argument(
+        "target",
+        metavar="TARGET",
+        help="module:ClassName or file.py:ClassName, name of a preset, or path of a TOML file",
+    )
     parser.add_argument(
         "--fmi", choices=[version.value for version in Fmi], default=Fmi.V3_0.value, help="version of the standard"
     )
@@ -80,7 +88,7 @@ def _seconds(text: str) -> float:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    with _imports_from_here():
+    with _imports_from_here(options.target):
         stop_time, automata = _automata(options.target, start_values(options.start_value))
         files = {name: options.out / f"{_file_name(name)}.fmu" for name in automata}
         for file in files.values():
@@ -114,7 +122,7 @@ def _file_name(name: str) -> str:
 
 
 def _automata(target: str, starts: dict[str, float]) -> tuple[float | None, dict[str, Automaton]]:
-    module, colon, name = target.partition(":")
+    module, colon, name = target.rpartition(":")
     if not colon or Path(target).suffix == ".toml":
         if starts:
             raise UsageError("--start-value goes with module:ClassName; a scenario has its values in its file.")
@@ -136,7 +144,11 @@ def _automata(target: str, starts: dict[str, float]) -> tuple[float | None, dict
 
 def _found(module: str, name: str, target: str) -> object:
     try:
-        return getattr(importlib.import_module(module), name)
+        return getattr(_imported(module), name)
+    except FileNotFoundError as error:
+        if error.filename != module:
+            raise _failed(module, error) from error
+        raise UsageError(f"{target} cannot be found: there is no file {module}. Give file.py:ClassName.") from error
     except (AttributeError, ModuleNotFoundError, ValueError, TypeError) as error:
         # A module that is there may fail with the same errors.
         if not _is_about_the_target(error, module, name):
@@ -144,6 +156,20 @@ def _found(module: str, name: str, target: str) -> object:
         raise UsageError(f"{target} cannot be found: {error}. Give module:ClassName.") from error
     except (Exception, SystemExit) as error:
         raise _failed(module, error) from error
+
+
+def _imported(module: str) -> ModuleType:
+    """Import a module by its name, or from a file."""
+    if not module.endswith(_SOURCE):
+        return importlib.import_module(module)
+    # A file may have the name of a module that is in use here.
+    name = f"{Path(module).stem}{'_file' * (Path(module).stem in sys.modules)}"
+    loader = SourceFileLoader(name, module)
+    loaded = importlib.util.module_from_spec(ModuleSpec(name, loader, origin=module))
+    # Dataclasses look their module up by its name.
+    sys.modules[name] = loaded
+    loader.exec_module(loaded)
+    return loaded
 
 
 def _is_about_the_target(error: Exception, module: str, name: str) -> bool:
@@ -160,20 +186,23 @@ def _failed(module: str, error: BaseException) -> ExportError:
         frame for frame in frames if frame.filename not in (__file__, importlib.__file__) and "<" not in frame.filename
     ]
     place = f" ({own[0].filename}, line {own[0].lineno})" if own else ""
+    more = f"python {module}" if module.endswith(_SOURCE) else f'python -c "import {module}"'
     return ExportError(
         f"The module '{module}' cannot be imported, because it fails with {type(error).__name__}: {error}{place}. "
-        f"Remedy: correct it; 'python -c \"import {module}\"' shows more."
+        f"Remedy: correct it; '{more}' shows more."
     )
 
 
 @contextmanager
-def _imports_from_here() -> Iterator[None]:
-    """Find modules in the current folder too, as ``python -m`` does."""
-    here = os.getcwd()
-    sys.path.insert(0, here)
+def _imports_from_here(target: str) -> Iterator[None]:
+    """Find modules in the current folder too, as ``python -m`` does, and beside a file that is exported from."""
+    module = target.rpartition(":")[0]
+    folders = [os.getcwd(), *([str(Path(module).absolute().parent)] if module.endswith(_SOURCE) else [])]
+    sys.path[:0] = folders
     importlib.invalidate_caches()
     try:
         yield
     finally:
-        if here in sys.path:
-            sys.path.remove(here)
+        for folder in folders:
+            if folder in sys.path:
+                sys.path.remove(folder)
