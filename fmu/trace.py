@@ -170,8 +170,14 @@ class _Tracer:
     def _call(self, method: Callable[[Values], Any], what: str) -> Any:
         try:
             return method(self._values())
-        except (TraceError, RuntimeError, TypeError) as error:
+        except TraceError as error:
             raise TraceError(f"{what} of {self.automaton.name} cannot be traced: {error}") from error
+        except (RuntimeError, TypeError) as error:
+            raise TraceError(
+                f"{what} of {self.automaton.name} cannot be traced: {error} Remedy: functions that need the numbers "
+                "themselves (np.argmax, np.sort, np.interp, ...) have no symbols; write np.where, np.minimum, np.maximum "
+                "and arithmetic instead."
+            ) from error
 
     def _flow_margin(self) -> Any:
         if not self.automaton.has_flow_set:
