@@ -175,8 +175,8 @@ class _Tracer:
         except (RuntimeError, TypeError) as error:
             raise TraceError(
                 f"{what} of {self.automaton.name} cannot be traced: {error} Remedy: functions that need the numbers "
-                "themselves (np.argmax, np.sort, np.interp, ...) have no symbols; write np.where, np.minimum, np.maximum "
-                "and arithmetic instead."
+                "themselves (np.argmax, np.sort, np.interp, ...) have no symbols; write np.where, np.minimum, "
+                "np.maximum and arithmetic instead."
             ) from error
 
     def _flow_margin(self) -> Any:
