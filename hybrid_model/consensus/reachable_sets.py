@@ -32,7 +32,10 @@ _STALLED = 1e-10
 _TAIL = 1e-11
 _MOST_CYCLES = 1_000_000_000
 _LOST = 0.1
-"""What may be lost by taking periods together, as a share and with the square root of the tail: 3e-7 for the finest."""
+"""Times the root of the tail, the share that may be lost by taking periods together: 3e-7 for the finest tail."""
+
+_OF_ALL = 0.02
+"""The share is that of the periods taken together, and this part of it of all that came before."""
 
 _MOST_CELLS = 20_000
 _MOST_WAVING = 5000
@@ -279,7 +282,7 @@ class _Periods:
     """
 
     def __init__(self, generators: NDArray[np.float64], monodromy: NDArray[np.float64], tail: float) -> None:
-        self._generators, self._tail = generators, tail
+        self._generators, self._tail, self._lost = generators, tail, _LOST * tail**0.5
         self._powers, self._sums = [monodromy], [np.eye(len(monodromy))]
 
     def sum(self, directions: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -294,30 +297,32 @@ class _Periods:
                     f"disagreement does not vanish to {self._tail:g} of itself in {_MOST_CYCLES} periods; "
                     "choose beta further below the Floquet rate."
                 )
+            wanted = level
             level, whole, later, along_later = self._advance(now, along, level, values)
             values += np.abs(whole).sum(axis=0)
             points += shift @ self._sums[level] @ (self._generators.T @ np.sign(whole))
             if np.linalg.norm(later) <= self._tail * np.linalg.norm(unit):
                 return values * lengths, points
             shift, cycles = shift @ self._powers[level], cycles + 2**level
-            now, along, level = later, along_later, level + 1
+            # A block that had to be halved is not doubled again at once.
+            now, along, level = later, along_later, level + (level >= wanted)
 
     def _advance(
         self, now: NDArray[np.float64], along: NDArray[np.float64], level: int, values: NDArray[np.float64]
     ) -> tuple[int, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """``2^level`` periods or less at a time: the level, and along all of them; the directions after them."""
-        while True:
-            power, total = self._table(level)
-            later = power.T @ now
-            along_later = self._along(later)
-            whole = self._along(total.T @ now) if level else along
-            if not level:
-                return level, whole, later, along_later
-            turned = np.where(along * along_later < 0, np.minimum(np.abs(along), np.abs(along_later)), 0.0)
-            lost = 2**level * turned.sum(axis=0)
-            if np.all(lost <= self._tail ** (1 / 2) * _LOST * (values + np.abs(whole).sum(axis=0))):
-                return level, whole, later, along_later
-            level -= 1
+        later = self._table(level)[0].T @ now
+        along_later = self._along(later)
+        while level:
+            # A sign that turns twice would not be seen at the ends alone.
+            halfway = self._powers[level - 1].T @ now
+            middle = self._along(halfway)
+            size = (np.abs(along) + 2 * np.abs(middle) + np.abs(along_later)).sum(axis=0) / 4
+            lost = _turned(along, middle) + _turned(middle, along_later)
+            if np.all(lost <= self._lost * (size + _OF_ALL * values / 2**level)):
+                return level, self._along(self._sums[level].T @ now), later, along_later
+            level, later, along_later = level - 1, halfway, middle
+        return level, along, later, along_later
 
     def _table(self, level: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """``M^q`` and ``I + M + ... + M^{q-1}`` for ``q = 2^level``."""
@@ -332,3 +337,8 @@ class _Periods:
             # A threaded product with few columns costs more than it gives.
             return np.asarray(np.einsum("ri,ic->rc", self._generators, directions))
         return self._generators @ directions
+
+
+def _turned(before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Sum over rows whose sign changes of the lesser magnitude, shape (count,)."""
+    return np.asarray(np.where(before * after < 0, np.minimum(np.abs(before), np.abs(after)), 0.0).sum(axis=0))

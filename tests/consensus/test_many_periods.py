@@ -1,0 +1,63 @@
+"""Sums over many periods at a time against the sums one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hybrid_model.consensus.reachable_sets import _support
+
+
+def one_by_one(generators, monodromy, direction, tail):
+    value, now, first = 0.0, direction, np.linalg.norm(direction)
+    while np.linalg.norm(now) > tail * first:
+        value += np.abs(generators @ now).sum()
+        now = monodromy.T @ now
+    return value + np.abs(generators @ now).sum()
+
+
+def drawn(seed, size, slowest, spread, turning):
+    """Generators, and a monodromy matrix with real eigenvalues down from `slowest`, or a slow pair that turns."""
+    random = np.random.default_rng(seed)
+    values = slowest ** (spread ** np.arange(size))
+    vectors = np.linalg.qr(random.standard_normal((size, size)))[0] + 0.3 * random.standard_normal((size, size))
+    blocks = np.diag(values)
+    if turning and size > 1:
+        cosine, sine = slowest * np.cos(turning), slowest * np.sin(turning)
+        blocks[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    monodromy = vectors @ blocks @ np.linalg.inv(vectors)
+    return random.standard_normal((60, size)), monodromy, random.standard_normal((size, 5))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    size=st.integers(1, 5),
+    slowest=st.sampled_from([0.3, 0.9, 0.99, 0.999]),
+    spread=st.sampled_from([1.01, 1.3, 3.0]),
+    turning=st.sampled_from([0.0, 0.0, 1e-3, 0.1, 2.0]),
+    tail=st.sampled_from([1e-3, 1e-11]),
+)
+def test_values_are_those_of_the_periods_one_by_one(seed, size, slowest, spread, turning, tail):
+    generators, monodromy, directions = drawn(seed, size, slowest, spread, turning)
+    values, points = _support(generators, monodromy, directions, tail)
+    # Errors that are admissible reach the value, and nothing beyond it.
+    np.testing.assert_allclose(np.einsum("ic,ic->c", directions, points), values, rtol=1e-8)
+    for k, direction in enumerate(directions.T):
+        whole = one_by_one(generators, monodromy, direction, 1e-14)
+        assert values[k] <= whole * (1 + 1e-9)
+        # What earlier periods than the tail add, and what is lost where signs turn.
+        assert values[k] >= whole * (1 - 10 * tail - np.sqrt(tail))
+
+
+def test_a_billion_periods_are_summed_at_once():
+    """A geometric series: without memory of the number of periods, 1/(1 - m)."""
+    slow = 1 - 1e-7
+    values, points = _support(np.array([[1.0]]), np.array([[slow]]), np.array([[2.0]]), 1e-12)
+    assert values == pytest.approx([2e7], rel=1e-8)
+    assert points == pytest.approx(np.array([[1e7]]), rel=1e-8)
+
+
+def test_what_does_not_vanish_is_refused():
+    with pytest.raises(ValueError, match="does not vanish"):
+        _support(np.array([[1.0]]), np.array([[1.0]]), np.array([[1.0]]))
