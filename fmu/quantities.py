@@ -81,6 +81,6 @@ def display_attributes(unit: str, display: str) -> dict[str, str]:
     known, shown = base_unit(unit), base_unit(display)
     if known is None or shown is None or known.exponents != shown.exponents:
         raise ValueError(f"{display!r} does not measure what {unit!r} does: choose two units of one quantity.")
-    attributes = {"name": display, "factor": repr(known.factor / shown.factor)}
+    attributes = {"name": display, "factor": repr(float(known.ratio / shown.ratio))}
     offset = (known.offset - shown.offset) / shown.factor
     return attributes | ({"offset": repr(offset)} if offset else {})

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 """Attributes of the element BaseUnit, in the order of the schemas."""
@@ -26,13 +28,20 @@ class BaseUnit:
     ----------
     exponents : tuple of int, shape (8,)
         Of kg, m, s, A, K, mol, cd, rad.
-    factor, offset : float
+    ratio : Fraction
+        The factor, without rounding: a km/h is 1000/3600 m/s.
+    offset : float
         As in the FMI standard 3.0, section 2.4.3.
     """
 
     exponents: Exponents = (0,) * len(BASE_UNITS)
-    factor: float = 1.0
+    ratio: Fraction = Fraction(1)
     offset: float = 0.0
+
+    @property
+    def factor(self) -> float:
+        """The factor, as in the FMI standard 3.0, section 2.4.3."""
+        return float(self.ratio)
 
     def attributes(self) -> dict[str, str]:
         """Return the attributes of the element BaseUnit that differ from their defaults."""
@@ -45,7 +54,8 @@ class BaseUnit:
 
 
 def _base(factor: float = 1.0, offset: float = 0.0, **exponents: int) -> BaseUnit:
-    return BaseUnit(tuple(exponents.get(name, 0) for name in BASE_UNITS), factor, offset)
+    # As it is written: 1e-3 is a thousandth.
+    return BaseUnit(tuple(exponents.get(name, 0) for name in BASE_UNITS), Fraction(repr(factor)), offset)
 
 
 # The prefixed units kg and (from them) everything mechanical are coherent; g is what prefixes are set before.
@@ -99,6 +109,7 @@ _PREFIXES = {
     **{"Q": 30, "R": 27, "Y": 24, "Z": 21, "E": 18, "P": 15, "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "da": 1},
     **{"d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12, "f": -15, "a": -18, "z": -21, "y": -24},
 }
+_SMALLEST, _LARGEST = Fraction(sys.float_info.min), Fraction(sys.float_info.max)
 _FACTOR = re.compile(r"(?P<symbol>[A-Za-z%]+)(?P<exponent>[+-]?\d{1,3})?")
 
 
@@ -125,7 +136,7 @@ def base_unit(text: str) -> BaseUnit | None:
     Returns
     -------
     BaseUnit or None
-        None for a unit that is not known or not written in this notation.
+        None for a unit that is not known, not written in this notation, or beyond the range of numbers.
     """
     expression = _parse(text)
     if expression is None:
@@ -133,15 +144,15 @@ def base_unit(text: str) -> BaseUnit | None:
     factors = expression.factors
     if len(factors) == 1 and factors[0][1] == 1:
         return _symbol(factors[0][0])
-    exponents, factor = [0] * len(BASE_UNITS), 1.0
+    exponents, ratio = [0] * len(BASE_UNITS), Fraction(1)
     for symbol, power in factors:
         known = _symbol(symbol)
         # A scale with an offset has no products: 1/degC is a difference's, m.degC is nothing.
         if known is None or known.offset:
             return None
         exponents = [total + power * n for total, n in zip(exponents, known.exponents, strict=True)]
-        factor *= known.factor**power
-    return BaseUnit(tuple(exponents), factor)
+        ratio *= known.ratio**power
+    return BaseUnit(tuple(exponents), ratio) if _SMALLEST <= ratio <= _LARGEST else None
 
 
 def unit_per_second(text: str) -> str:
@@ -199,10 +210,7 @@ def _symbol(symbol: str) -> BaseUnit | None:
     for length in (1, 2):
         prefix, unit = symbol[:length], _PREFIXABLE.get(symbol[length:])
         if prefix in _PREFIXES and unit is not None:
-            # One rounding: kg has the factor 1 and not 1e-3 * 1e3.
-            power = _PREFIXES[prefix] + round(math.log10(unit.factor)) if unit.factor in (1.0, 1e-3, 1e5) else None
-            factor = float(f"1e{power}") if power is not None else unit.factor * 10.0 ** _PREFIXES[prefix]
-            return BaseUnit(unit.exponents, factor)
+            return BaseUnit(unit.exponents, unit.ratio * Fraction(10) ** _PREFIXES[prefix])
     return None
 
 

@@ -58,6 +58,8 @@ class FmiType(enum.Enum):
 STOP_AT_EVENTS = "stop_at_events"
 """Name of the FMI 2.0 parameter that makes fmi2DoStep end at an event with fmi2Discard."""
 
+_LEAST_INT32, _GREATEST_INT32 = -(2**31), 2**31 - 1
+
 NEXT_EVENT = "next_event"
 """Name of the countdown clock that tells when the next event comes."""
 
@@ -153,7 +155,7 @@ def fmu_variables(traced: Trace | NetworkTrace, fmi: Fmi = Fmi.V3_0, *, clocks: 
     Raises
     ------
     ExportError
-        If a name is taken twice.
+        If a name is taken twice, or an integer does not fit into 32 bits.
     """
     automaton, layout = traced.automaton, traced.layout
     table = [FmuVariable("time", FmiType.FLOAT64, Bank.TIME, 0, "independent", "continuous", unit="s")]
@@ -203,9 +205,26 @@ def _declared(kind: Kind, place: Place, fmi: Fmi) -> list[FmuVariable]:
         maximum=variable.maximum,
         nominal=variable.nominal,
     )
+    if whole.type is FmiType.INT32:
+        _require_integers(whole)
     if fmi is Fmi.V3_0 and variable.shape and causality in ("parameter", "local"):
         return [whole] if variable.size else []
     return list(_elements(whole, element_names(variable)))
+
+
+def _require_integers(variable: FmuVariable) -> None:
+    given = [("starts at", start) for start in variable.start or ()]
+    given += [
+        (name, bound)
+        for name, bound in (("has the minimum", variable.minimum), ("has the maximum", variable.maximum))
+        if bound is not None
+    ]
+    for what, value in given:
+        if not (_LEAST_INT32 <= value <= _GREATEST_INT32 and value == int(value)):
+            raise ExportError(
+                f"The integer variable {variable.name!r} {what} {value:.17g}: an FMU's integers are whole numbers from "
+                f"{_LEAST_INT32} to {_GREATEST_INT32}, so give one of them, or declare the variable without integer."
+            )
 
 
 def _elements(whole: FmuVariable, names: Sequence[str]) -> Iterator[FmuVariable]:

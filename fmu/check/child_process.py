@@ -64,7 +64,9 @@ def run_experiment(plan: dict[str, Any], where: str, limits: RunLimits) -> Itera
         for line in lines:
             if not line.get("done"):
                 message = f"{where}: {line.get('message', '')}"
-                yield Finding(Severity(line["severity"]), str(line["rule"]), message, LIFE_CYCLE)
+                yield Finding(
+                    Severity(line["severity"]), str(line["rule"]), message, line.get("reference") or LIFE_CYCLE
+                )
         yield from _ending(status, done, at, where, limits, _tail(folder / "stderr"))
         printed = _tail(folder / "stdout")
         if printed:

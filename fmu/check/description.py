@@ -75,6 +75,16 @@ class Unknown:
 
 
 @dataclass(frozen=True)
+class Unit:
+    """One unit; `base` and `displays` are the attributes of its BaseUnit (none, if there is none) and DisplayUnits."""
+
+    name: str
+    base: Mapping[str, str]
+    displays: tuple[Mapping[str, str], ...]
+    line: int
+
+
+@dataclass(frozen=True)
 class Description:
     """A model description.
 
@@ -101,6 +111,7 @@ class Description:
         FMI 2: by interface type.
     number_of_indicators : int
         FMI 2: as declared; FMI 3: entries.
+    units : tuple of Unit
     """
 
     version: str
@@ -115,6 +126,7 @@ class Description:
     items: Mapping[str, tuple[int, ...]]
     source_files: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     number_of_indicators: int = 0
+    units: tuple[Unit, ...] = ()
 
     def referred(self, reference: int) -> Variable | None:
         """Return the variable that the structure or an attribute ``derivative`` refers to."""
@@ -200,6 +212,17 @@ def read_description(root: etree._Element) -> Description:
         number_of_indicators=int(root.get("numberOfEventIndicators", 0))
         if major == 2
         else len(structure["indicators"]),
+        units=tuple(_unit(element) for element in root.iterfind("UnitDefinitions/Unit")),
+    )
+
+
+def _unit(element: etree._Element) -> Unit:
+    base = element.find("BaseUnit")
+    return Unit(
+        name=str(element.get("name")),
+        base={} if base is None else dict(base.attrib),
+        displays=tuple(dict(display.attrib) for display in element.iterfind("DisplayUnit")),
+        line=element.sourceline or 0,
     )
 
 

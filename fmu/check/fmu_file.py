@@ -18,6 +18,7 @@ from fmu.check.rules_binaries import binary_findings
 from fmu.check.rules_files import file_findings
 from fmu.check.rules_interfaces import interface_findings
 from fmu.check.rules_structure import structure_findings
+from fmu.check.rules_units import unit_findings
 from fmu.check.rules_variables import variable_findings
 from fmu.check.smoke import run_fmu
 from fmu.check.xml_file import XmlError, parse, require_size, schema_findings
@@ -114,6 +115,7 @@ def _major(root: etree._Element, report: Report) -> int | None:
 
 def _static(archive: Archive, content: bytes, description: Description) -> Iterator[Finding]:
     yield from fmpy_findings(content, description)
+    yield from unit_findings(description)
     yield from variable_findings(description)
     yield from structure_findings(description)
     yield from interface_findings(description)

@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from fmu.check.child.experiments import POINTS
-from fmu.check.description import Description, Variable, true
+from fmu.check.description import Description, Unknown, Variable, true
 
 LARGEST_ARRAY = 1_000_000
 """Elements of an array that is read."""
 _JACOBIAN = 20
 """Rows and columns of the Jacobian that are asked for."""
 DIRECTIONAL = ("providesDirectionalDerivative", "providesDirectionalDerivatives")
+ADJOINT = "providesAdjointDerivatives"
 
 
 def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> dict[str, Any]:
@@ -47,7 +48,7 @@ def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> 
         "binary": str(binary),
         "resources": place,
         "token": description.token,
-        "variables": [_entry(description, kind, variable) for variable in description.variables],
+        "variables": [entry(description, variable) for variable in description.variables],
         "event_mode": kind == "CoSimulation" and true(attributes, "hasEventMode"),
         "variable_step": true(attributes, "canHandleVariableCommunicationStepSize"),
         "once": true(attributes, "canBeInstantiatedOnlyOncePerProcess"),
@@ -63,8 +64,9 @@ def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> 
             if description.major == 2
             else sum(description.size(indicator) or 0 for indicator in indicators if indicator is not None)
         ),
-        "jacobian": _jacobian(description) if any(true(attributes, name) for name in DIRECTIONAL) else [],
-        "adjoint": true(attributes, "providesAdjointDerivatives"),
+        "jacobian": _jacobian(description) if any(true(attributes, name) for name in (*DIRECTIONAL, ADJOINT)) else [],
+        "directional": any(true(attributes, name) for name in DIRECTIONAL),
+        "adjoint": true(attributes, ADJOINT),
         "output_derivatives": _differentiable_outputs(description, attributes),
         "start": start,
         "stop": stop,
@@ -75,7 +77,8 @@ def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> 
     }
 
 
-def _entry(description: Description, kind: str, variable: Variable) -> list[Any]:
+def entry(description: Description, variable: Variable) -> list[Any]:
+    """Return a variable as the child process reads it."""
     size = description.size(variable)
     fits = size is not None and size <= LARGEST_ARRAY
     settable = (
@@ -94,31 +97,44 @@ def _entry(description: Description, kind: str, variable: Variable) -> list[Any]
 
 def _jacobian(description: Description) -> list[list[Any]]:
     """Return some unknowns, each with its value reference and those of the inputs and states it depends on."""
-    derivatives = [description.referred(u.reference) for u in description.structure["derivatives"]]
-    states = {d.derivative for d in derivatives if d is not None and d.derivative is not None}
+    knowns = smooth_knowns(description)
     rows: list[list[Any]] = []
+    for unknown, variable in smooth_unknowns(description):
+        # Without dependencies an unknown depends on all knowns.
+        listed = knowns if unknown.dependencies is None else unknown.dependencies
+        references = [knowns[number].reference for number in listed if number in knowns]
+        if references:
+            rows.append([variable.name, variable.reference, references[:_JACOBIAN]])
+    return rows[:_JACOBIAN]
+
+
+def smooth_unknowns(description: Description) -> list[tuple[Unknown, Variable]]:
+    """Return the state derivatives and outputs that are smooth scalars."""
+    found = []
     for unknown in (*description.structure["derivatives"], *description.structure["outputs"]):
         variable = description.referred(unknown.reference)
-        if variable is None or not _is_smooth_scalar(variable):
-            continue
-        knowns = []
-        for number in unknown.dependencies or ():
-            known = description.referred(number)
-            if known is not None and (number in states or known.causality == "input") and _is_smooth_scalar(known):
-                knowns.append(known.reference)
-        if knowns:
-            rows.append([variable.name, variable.reference, knowns[:_JACOBIAN]])
-    return rows[:_JACOBIAN]
+        if variable is not None and is_smooth_scalar(variable):
+            found.append((unknown, variable))
+    return found
+
+
+def smooth_knowns(description: Description) -> dict[int, Variable]:
+    """Return the inputs and continuous states that are smooth scalars, by what the model structure calls them."""
+    derivatives = [description.referred(u.reference) for u in description.structure["derivatives"]]
+    states = {d.derivative for d in derivatives if d is not None and d.derivative is not None}
+    numbered = ((k if description.major == 2 else v.reference, v) for k, v in enumerate(description.variables, 1))
+    return {n: v for n, v in numbered if (n in states or v.causality == "input") and is_smooth_scalar(v)}
 
 
 def _differentiable_outputs(description: Description, attributes: Any) -> list[int]:
     if attributes.get("maxOutputDerivativeOrder", "0") == "0":
         return []
-    outputs = [v for v in description.variables if v.causality == "output" and _is_smooth_scalar(v)]
+    outputs = [v for v in description.variables if v.causality == "output" and is_smooth_scalar(v)]
     return [variable.reference for variable in outputs[:_JACOBIAN]]
 
 
-def _is_smooth_scalar(variable: Variable) -> bool:
+def is_smooth_scalar(variable: Variable) -> bool:
+    """Return whether a variable is a scalar that can have derivatives."""
     double = variable.type in ("Real", "Float64") and not variable.dimensions and not variable.clocks
     return double and variable.variability == "continuous"
 

@@ -8,7 +8,8 @@ from typing import Any
 from fmu.check.child_process import RunLimits, run_experiment
 from fmu.check.description import Description, true
 from fmu.check.findings import Finding, note, quoted
-from fmu.check.plan import DIRECTIONAL, LARGEST_ARRAY, plan_of
+from fmu.check.plan import ADJOINT, DIRECTIONAL, LARGEST_ARRAY, plan_of
+from fmu.check.plan_claims import claims
 from fmu.check.platforms import EXTENSIONS, parts_of, runs_here, this_machine
 
 
@@ -44,7 +45,8 @@ def run_fmu(folder: Path, description: Description, limits: RunLimits) -> tuple[
             continue
         executed.append(kind)
         plan = plan_of(folder, binary, description, kind)
-        for name, changes in _experiments(kind, attributes).items():
+        experiments = {**_experiments(kind, attributes), **claims(description, kind)}
+        for name, changes in experiments.items():
             findings += list(run_experiment({**plan, **changes}, f"{kind}, {name}", limits))
     large = [v for v in description.variables if (description.size(v) or 0) > LARGEST_ARRAY]
     if large:
@@ -76,7 +78,7 @@ def _experiments(kind: str, attributes: Any) -> dict[str, dict[str, Any]]:
         experiments["state"] = {"experiment": "state"}
     if kind == "CoSimulation":
         experiments["bad steps"] = {"experiment": "bad_steps"}
-    directional = any(true(attributes, name) for name in DIRECTIONAL)
+    directional = any(true(attributes, name) for name in (*DIRECTIONAL, ADJOINT))
     if kind != "ScheduledExecution" and (directional or attributes.get("maxOutputDerivativeOrder", "0") != "0"):
         experiments["derivatives"] = {"experiment": "derivatives"}
     return experiments

@@ -1,14 +1,18 @@
 """The model description: valid by the schema and by fmpy's rules, for every model of the repository."""
 
+import math
+
 import pytest
 from catalogue import cases
-from description_cases import only_clocks
+from description_cases import BOTH, only_clocks
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import hybrid_model as hm
 from fmu.errors import ExportError
 from fmu.export import export_fmu
+from fmu.trace import trace
+from fmu.variables import fmu_variables
 
 QUICK = ("bouncing_ball", "agent2_dynamic", "thermostat", "newtons_cradle")
 """fmpy takes its time with names of many parts."""
@@ -66,6 +70,40 @@ def test_a_variable_called_time_is_refused(tmp_path):
     block = type("Block", (hm.HybridAutomaton,), {"time": hm.State(0.0), "flow_map": lambda self, s: {"time": 1.0}})()
     with pytest.raises(ExportError, match="two variables called 'time'"):
         export_fmu(block, tmp_path / "block.fmu")
+
+
+def _with(declaration):
+    return type("Block", (hm.HybridAutomaton,), {"n": declaration, "flow_map": lambda self, s: {}})()
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize(
+    ("declaration", "text"),
+    [
+        (hm.Parameter(2**31, integer=True), "'n' starts at 2147483648:"),
+        (hm.Parameter(-(2**31) - 1, integer=True), "'n' starts at -2147483649:"),
+        (hm.Parameter([0, 2**40], integer=True), "'n' starts at 1099511627776:"),
+        (hm.DiscreteState(2**31, integer=True), "'n' starts at 2147483648:"),
+        (hm.Parameter(0, integer=True, maximum=2**31), "'n' has the maximum 2147483648:"),
+        (hm.Parameter(0, integer=True, minimum=-(2**31) - 1), "'n' has the minimum -2147483649:"),
+        (hm.Parameter(0, integer=True, maximum=math.inf), "'n' has the maximum inf:"),
+        (hm.Parameter(1, integer=True, minimum=0.5), "'n' has the minimum 0.5:"),
+    ],
+)
+def test_integers_beyond_32_bits_are_refused(declaration, text, fmi, tmp_path):
+    with pytest.raises(ExportError, match=rf"{text} .* from -2147483648 to 2147483647, so give"):
+        export_fmu(_with(declaration), tmp_path / "block.fmu", fmi=fmi)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("fmi", BOTH)
+def test_integers_of_32_bits_are_written(fmi):
+    """The least and the greatest, as start and as range; beyond them floats are no integers."""
+    widest = hm.Parameter([-(2**31), 2**31 - 1], integer=True, minimum=-(2**31), maximum=2**31 - 1)
+    variables = fmu_variables(trace(_with(widest)), fmi)
+    starts = [start for v in variables if v.name.startswith("n") for start in v.start]
+    assert starts == [-(2**31), 2**31 - 1]
+    fmu_variables(trace(_with(hm.Parameter(2.0**40, maximum=math.inf))), fmi)
 
 
 def test_unknown_versions_are_refused(tmp_path):

@@ -238,17 +238,20 @@ print("taken", taken, "equal", repr(again) == repr(fresh))
 """
 
 
+# In Co-Simulation a state with huge rates costs a call all the solver steps that it may take.
+MANY = {label: 2000 if setting["kind"] == "me" else 400 for label, setting in SETTINGS.items()}
+
+
 @pytest.mark.parametrize(
     ("label", "rounds"),
-    [("2.0 CS", 60), ("3.0 ME", 300), *(pytest.param(label, 2000, marks=pytest.mark.long) for label in SETTINGS)],
+    [("2.0 CS", 60), ("3.0 ME", 300), *(pytest.param(label, n, marks=pytest.mark.long) for label, n in MANY.items())],
 )
 def test_forged_bytes_with_a_right_checksum_do_no_harm(label, rounds, paths):
     """Whoever can compute the checksum can put in anything: no crash, no hang, and a reset heals all."""
     fmi = SETTINGS[label]["fmi"]
     script = FORGED.format(tests=TESTS, rounds=rounds)
     command = [sys.executable, "-c", script, str(paths["mix", fmi]), label, fmi, str(rounds)]
-    # A state with huge rates may cost all the solver steps that one call may take.
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60 + rounds // 5)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60 + rounds)
     assert done.returncode == 0, done.stderr[-2000:]
     _, taken, _, equal = done.stdout.split()
     assert int(taken) > rounds // 10

@@ -142,6 +142,28 @@ def test_display_units_convert():
         display_attributes("m", "s")
 
 
+@pytest.mark.parametrize(
+    ("unit", "display", "factor"),
+    [
+        ("m/s", "km/h", 3.6),
+        ("km/h", "m/s", 1 / 3.6),
+        ("Pa", "bar", 1e-5),
+        ("rad", "deg", 180 / math.pi),
+        ("rad/s", "rpm", 30 / math.pi),
+        ("m", "mm", 1000.0),
+        ("kg/m3", "g/l", 1.0),
+    ],
+)
+def test_factors_of_display_units_are_rounded_once(unit, display, factor):
+    """3600/1000 is 3.6, and not the 3.5999999999999996 of three rounded numbers."""
+    assert float(display_attributes(unit, display)["factor"]) == factor
+
+
+@pytest.mark.parametrize("text", ["Qm999", "ym-999", "1/Qm99", "Qm99.ym99.Qm99"])
+def test_units_beyond_the_range_of_numbers_have_no_base_unit(text):
+    assert base_unit(text) is None
+
+
 def test_display_units_of_the_known_quantities_measure_the_same():
     for unit in ("m/s", "rad", "rad/s", "Pa", "K"):
         for display in quantity(unit).displays:

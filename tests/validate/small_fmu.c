@@ -1,4 +1,4 @@
-/* A decay x' = -x, y = x, stepped by Euler: both versions, all interface types, and faults by -DFAULT_NAME.
+/* A decay x' = -rate x + u, y = x, stepped by Euler: both versions, all interface types, and faults by -DFAULT_NAME.
    No FMI header: the signatures are the standard's, written out for this one machine. */
 #include <math.h>
 #include <stdbool.h>
@@ -14,10 +14,14 @@
 #define API __attribute__((visibility("default")))
 #define OK 0
 #define ERROR 3
+/* What the functions behind optional capability flags return. */
+#ifndef CLAIMED
+#define CLAIMED ERROR
+#endif
 
 typedef struct {
-    double t, x, rate, memory;
-    int calls, reads;
+    double t, x, rate, u, memory;
+    int calls, reads, initializing;
 } State;
 
 static State* make(const char* token) {
@@ -56,10 +60,13 @@ static State* make(const char* token) {
 }
 
 static int get(State* s, unsigned reference, double* value) {
+#ifdef FAULT_NO_VALUES_IN_INITIALIZATION
+    if (s->initializing) return ERROR;
+#endif
     switch (reference) {
         case 0: *value = s->t; return OK;
         case 1: *value = s->x; return OK;
-        case 2: *value = -s->rate * s->x; return OK;
+        case 2: *value = -s->rate * s->x + s->u; return OK;
         case 3: *value = s->rate; return OK;
         case 4: *value = s->x - 0.5; return OK;
         case 5:
@@ -73,6 +80,7 @@ static int get(State* s, unsigned reference, double* value) {
             *value = s->x;
 #endif
             return OK;
+        case 7: *value = s->u; return OK;
         default: return ERROR;
     }
 }
@@ -80,6 +88,7 @@ static int get(State* s, unsigned reference, double* value) {
 static int set(State* s, unsigned reference, double value) {
     if (reference == 1) s->x = value;
     else if (reference == 3) s->rate = value;
+    else if (reference == 7) s->u = value;
     else return ERROR;
     return OK;
 }
@@ -97,7 +106,7 @@ static int step(State* s, double t, double h) {
 #elif !defined(FAULT_ANY_STEP)
     if (!(h > 0.0)) return ERROR;
 #endif
-    s->x += -s->rate * s->x * h - 1e-9 * s->memory;
+    s->x += (-s->rate * s->x + s->u) * h - 1e-9 * s->memory;
     s->memory += h;
     s->t = t + h;
 #ifdef FAULT_REPEAT
@@ -118,6 +127,7 @@ static void reset(State* s) {
 #endif
     s->x = 1.0;
     s->rate = 1.0;
+    s->u = 0.0;
 }
 
 static int copy(State* s, void** out) {
@@ -137,11 +147,12 @@ static int put_back(State* s, const State* from) {
     return OK;
 }
 
-/* d y / d x = 1; d der(x) / d x = -rate. */
-static double slope(const State* s, unsigned unknown) {
+/* d y / d x = 1; d der(x) / d x = -rate; d der(x) / d u = 1. */
+static double slope(const State* s, unsigned unknown, unsigned known) {
 #ifdef FAULT_DERIVATIVE_NAN
     return NAN;
 #endif
+    if (known == 7) return unknown == 2;
     return unknown == 2 ? -s->rate : 1.0;
 }
 
@@ -164,8 +175,8 @@ API void* fmi3InstantiateCoSimulation(const char* name, const char* token) { (vo
 API void* fmi3InstantiateModelExchange(const char* name, const char* token) { (void)name; return make(token); }
 API void* fmi3InstantiateScheduledExecution(const char* name, const char* token) { (void)name; return make(token); }
 API void fmi3FreeInstance(State* s) { free(s); }
-API int fmi3EnterInitializationMode(State* s, bool d, double tol, double start) { (void)d; (void)tol; s->t = start; return OK; }
-API int fmi3ExitInitializationMode(State* s) { (void)s; return OK; }
+API int fmi3EnterInitializationMode(State* s, bool d, double tol, double start) { s->initializing = 1; (void)d; (void)tol; s->t = start; return OK; }
+API int fmi3ExitInitializationMode(State* s) { s->initializing = 0; return OK; }
 API int fmi3EnterEventMode(State* s) { (void)s; return OK; }
 API int fmi3EnterStepMode(State* s) {
 #ifdef FAULT_NEEDS_EVENT_MODE
@@ -215,6 +226,10 @@ API int fmi3DoStep(State* s, double t, double h, bool no, bool* event, bool* end
 #ifdef FAULT_LAST_TIME
     *last = t + h / 2.0;
 #endif
+#ifdef FAULT_MANY
+    *early = true;
+    *last = s->t = t + 5e-5;
+#endif
 #ifdef FAULT_PROGRESS
     *early = true;
     *last = s->t = t;
@@ -236,10 +251,19 @@ API int fmi3DeserializeFMUState(State* s, const uint8_t* in, size_t n, void** ou
 }
 API int fmi3GetDirectionalDerivative(State* s, const uint32_t r[], size_t n, const uint32_t k[], size_t nk, const double seed[],
                                      size_t ns, double out[], size_t no) {
-    (void)k; (void)ns; (void)no;
+    (void)ns; (void)no;
     for (size_t i = 0; i < n; i++) {
         out[i] = 0.0;
-        for (size_t j = 0; j < nk; j++) out[i] += slope(s, r[i]) * seed[j];
+        for (size_t j = 0; j < nk; j++) out[i] += slope(s, r[i], k[j]) * seed[j];
+        if (r[i] == 5 && k[0] == 7) {
+#ifdef FAULT_NOISE
+            out[i] = 1e-5 * (s->calls++ % 7 - 3.3);
+#elif defined(FAULT_ZERO_REFUSED)
+            return ERROR;
+#elif defined(FAULT_ZERO_NAN)
+            out[i] = NAN;
+#endif
+        }
 #ifdef FAULT_DERIVATIVE_REFUSED
         return ERROR;
 #endif
@@ -248,10 +272,13 @@ API int fmi3GetDirectionalDerivative(State* s, const uint32_t r[], size_t n, con
 }
 API int fmi3GetAdjointDerivative(State* s, const uint32_t r[], size_t n, const uint32_t k[], size_t nk, const double seed[],
                                  size_t ns, double out[], size_t no) {
-    (void)k; (void)ns; (void)no;
+    (void)ns; (void)no;
     for (size_t j = 0; j < nk; j++) {
         out[j] = 0.0;
-        for (size_t i = 0; i < n; i++) out[j] += slope(s, r[i]) * seed[i];
+        for (size_t i = 0; i < n; i++) out[j] += slope(s, r[i], k[j]) * seed[i];
+#ifdef FAULT_ADJOINT_REFUSED
+        return ERROR;
+#endif
 #ifdef FAULT_ADJOINT
         out[j] = -out[j];
 #endif
@@ -261,13 +288,26 @@ API int fmi3GetAdjointDerivative(State* s, const uint32_t r[], size_t n, const u
 API int fmi3GetOutputDerivatives(State* s, const uint32_t r[], size_t n, const int32_t orders[], double out[], size_t no) {
     (void)r; (void)no;
     for (size_t i = 0; i < n; i++) {
-        if (orders[i] != 1) return ERROR;
+        if (orders[i] != 1) return CLAIMED;
         get(s, 2, out + i);
 #ifdef FAULT_OUTPUT_DERIVATIVE
         out[i] = NAN;
 #endif
     }
     return OK;
+}
+API int fmi3EvaluateDiscreteStates(State* s) { (void)s; return CLAIMED; }
+API int fmi3GetNumberOfVariableDependencies(State* s, uint32_t r, size_t* n) { (void)s; (void)r; *n = 1; return CLAIMED; }
+API int fmi3GetVariableDependencies(State* s, uint32_t r, size_t e[], uint32_t k[], size_t f[], int kinds[], size_t n) {
+    (void)s; (void)r;
+    if (n != 1) return ERROR;
+    *e = *f = 1;
+    *k = 1;
+    *kinds = 0;
+#ifdef FAULT_DEPENDENCIES
+    return ERROR;
+#endif
+    return CLAIMED;
 }
 API int fmi3EnterContinuousTimeMode(State* s) { (void)s; return OK; }
 API int fmi3SetTime(State* s, double t) { s->t = t; return OK; }
@@ -293,8 +333,8 @@ API const char* fmi2GetTypesPlatform(void) { return "default"; }
 API void* fmi2Instantiate(const char* name, int kind, const char* token) { (void)name; (void)kind; return make(token); }
 API void fmi2FreeInstance(State* s) { free(s); }
 API int fmi2SetupExperiment(State* s, int d, double tol, double start) { (void)d; (void)tol; s->t = start; return OK; }
-API int fmi2EnterInitializationMode(State* s) { (void)s; return OK; }
-API int fmi2ExitInitializationMode(State* s) { (void)s; return OK; }
+API int fmi2EnterInitializationMode(State* s) { s->initializing = 1; return OK; }
+API int fmi2ExitInitializationMode(State* s) { s->initializing = 0; return OK; }
 API int fmi2EnterEventMode(State* s) { (void)s; return OK; }
 API int fmi2EnterContinuousTimeMode(State* s) { (void)s; return OK; }
 API int fmi2Terminate(State* s) { (void)s; return OK; }
@@ -333,10 +373,9 @@ API int fmi2SerializeFMUstate(State* s, void* state, char* out, size_t n) { (voi
 API int fmi2DeSerializeFMUstate(State* s, const char* in, size_t n, void** out) { copy(s, out); memcpy(*out, in, n); return OK; }
 API int fmi2GetDirectionalDerivative(State* s, const unsigned r[], size_t n, const unsigned k[], size_t nk, const double seed[],
                                      double out[]) {
-    (void)k;
     for (size_t i = 0; i < n; i++) {
         out[i] = 0.0;
-        for (size_t j = 0; j < nk; j++) out[i] += slope(s, r[i]) * seed[j];
+        for (size_t j = 0; j < nk; j++) out[i] += slope(s, r[i], k[j]) * seed[j];
 #ifdef FAULT_DERIVATIVE_LINEAR
         out[i] += 1.0;
 #endif
@@ -346,10 +385,14 @@ API int fmi2GetDirectionalDerivative(State* s, const unsigned r[], size_t n, con
 API int fmi2GetRealOutputDerivatives(State* s, const unsigned r[], size_t n, const int orders[], double out[]) {
     (void)r;
     for (size_t i = 0; i < n; i++) {
-        if (orders[i] != 1) return ERROR;
+        if (orders[i] != 1) return CLAIMED;
         get(s, 2, out + i);
     }
     return OK;
+}
+API int fmi2SetRealInputDerivatives(State* s, const unsigned r[], size_t n, const int orders[], const double v[]) {
+    (void)s; (void)n; (void)v;
+    return r[0] == 7 && orders[0] == 1 ? CLAIMED : ERROR;
 }
 API int fmi2SetTime(State* s, double t) { s->t = t; return OK; }
 API int fmi2SetContinuousStates(State* s, const double x[], size_t n) { (void)n; s->x = x[0]; return OK; }

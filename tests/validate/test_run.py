@@ -132,6 +132,15 @@ def test_a_discarded_step_is_a_note(tmp_path):
     assert any(finding.rule == "run.discard" for finding in report.findings)
 
 
+def test_a_run_of_many_events_is_cut_short(tmp_path):
+    """Thousands of early returns are legal as long as time goes on."""
+    report = check(tmp_path, 3, "MANY", description=only("CoSimulation", DESCRIPTIONS[3]))
+    [cut, *_] = [finding for finding in report.findings if finding.rule == "run.long"]
+    assert "ends at t = 0.500" in cut.message
+    assert cut.severity is Severity.NOTE
+    assert "run.progress" not in errors(report)
+
+
 def test_a_start_value_that_the_fmu_refuses_is_named(tmp_path):
     text = DESCRIPTIONS[3].replace(
         'name="margin" valueReference="4"', 'name="margin" valueReference="4" initial="exact" start="2"'

@@ -18,6 +18,10 @@ class Stopped(Exception):
     """The experiment cannot go on."""
 
 
+class Refused(Stopped):
+    """A call was refused that an FMU may refuse: the experiment finds nothing."""
+
+
 class Variable(NamedTuple):
     """A variable as the plan has it."""
 
@@ -60,13 +64,14 @@ class Recorder:
         """Note what is about to be called."""
         self._place[:] = text.encode("utf-8", "replace")[: PLACE_BYTES - 1].ljust(PLACE_BYTES, b"\0")
 
-    def find(self, severity: str, rule: str, message: str) -> None:
-        """Write a finding."""
-        self._findings.write(json.dumps({"severity": severity, "rule": rule, "message": message}) + "\n")
+    def find(self, severity: str, rule: str, message: str, reference: str | None = None) -> None:
+        """Write a finding; without a reference it rests on the life cycle of the standard."""
+        line = {"severity": severity, "rule": rule, "message": message, "reference": reference}
+        self._findings.write(json.dumps(line) + "\n")
 
-    def stop(self, rule: str, message: str) -> Stopped:
+    def stop(self, rule: str, message: str, reference: str | None = None) -> Stopped:
         """Write an error after which the experiment ends; raise what is returned."""
-        self.find("error", rule, message)
+        self.find("error", rule, message, reference)
         return Stopped()
 
     def done(self) -> None:
@@ -75,7 +80,10 @@ class Recorder:
 
 
 class Library:
-    """A loaded binary and one instance of its FMU."""
+    """A loaded binary and one instance of its FMU.
+
+    Where it is `lenient`, a refused call ends the experiment without a finding.
+    """
 
     prefix = ""
 
@@ -84,6 +92,7 @@ class Library:
         self.messages: list[str] = []
         self.variables = [Variable(*entry) for entry in plan["variables"]]
         self.handle: c.c_void_p | None = None
+        self.lenient = False
         recorder.at("loading the binary")
         try:
             self.library = c.CDLL(plan["binary"])
@@ -103,9 +112,15 @@ class Library:
         self.recorder.at(f"{self.prefix}{name}({shown})")
         return int(self.function(name)(self.handle, *arguments))
 
-    def do(self, name: str, *arguments: Any, shown: str = "") -> None:
-        """Call a function that must succeed here."""
+    def do(self, name: str, *arguments: Any, shown: str = "", may_discard: bool = False) -> None:
+        """Call a function that must succeed here, or at least be able to: it may have no answer at this point."""
         status = self.call(name, *arguments, shown=shown)
+        if status not in (OK, WARNING) and self.lenient:
+            raise Refused
+        if status == DISCARD and may_discard:
+            text = f"{self.prefix}{name} discards: the rest of this experiment is left out ({self.said()})."
+            self.recorder.find("note", "run.discard", text)
+            raise Refused
         if status not in (OK, WARNING):
             raise self.recorder.stop(
                 "run.refused",

@@ -9,25 +9,21 @@ from pathlib import Path
 from typing import Any
 
 from fmu.check.child.calls import OK, WARNING, Recorder, Stopped
-from fmu.check.child.co_simulation import CoSimulation
+from fmu.check.child.claims import element_dependencies, evaluation, input_derivatives, output_orders
+from fmu.check.child.dependencies import dependencies
 from fmu.check.child.fmi2 import Fmi2
 from fmu.check.child.fmi3 import Fmi3
-from fmu.check.child.model_exchange import ModelExchange
 from fmu.check.child.run import Bits, Run
-from fmu.check.child.scheduled_execution import ScheduledExecution
+from fmu.check.child.runs import instantiate, run_of
+from fmu.check.child.start_values import start_values
 
 POINTS = 200
 """Communication points of a run at most."""
-RUNS: dict[str, type[Run]] = {
-    "CoSimulation": CoSimulation,
-    "ModelExchange": ModelExchange,
-    "ScheduledExecution": ScheduledExecution,
-}
 
 
 def life_cycle(fmu: Any, recorder: Recorder) -> None:
     """Instantiate, run, reset, run again: equal results; terminate, free."""
-    _instantiate(fmu, recorder)
+    instantiate(fmu, recorder)
     first = _whole(fmu, recorder)
     fmu.do("Reset")
     second = _whole(fmu, recorder)
@@ -35,7 +31,7 @@ def life_cycle(fmu: Any, recorder: Recorder) -> None:
     fmu.do("Terminate") if not second[2] else None
     fmu.free()
     if not fmu.plan["once"]:
-        _instantiate(fmu, recorder)
+        instantiate(fmu, recorder)
         third = _whole(fmu, recorder)
         _compare(recorder, "run.repeat", "in a second instance", first, third)
         fmu.free()
@@ -43,8 +39,8 @@ def life_cycle(fmu: Any, recorder: Recorder) -> None:
 
 def state(fmu: Any, recorder: Recorder) -> None:
     """Get, run, set, run: equal results, also by way of bytes."""
-    _instantiate(fmu, recorder)
-    run = _run(fmu, recorder)
+    instantiate(fmu, recorder)
+    run = run_of(fmu, recorder)
     run.begin()
     half = max(fmu.plan["points"] // 2, 1)
     run.advance(half)
@@ -93,8 +89,8 @@ def token(fmu: Any, recorder: Recorder) -> None:
 def bad_steps(fmu: Any, recorder: Recorder) -> None:
     """Steps of NaN and of negative length are refused, in bounded time."""
     for h, name in ((math.nan, "NaN"), (-fmu.plan["step"], "a negative length")):
-        _instantiate(fmu, recorder)
-        run = _run(fmu, recorder)
+        instantiate(fmu, recorder)
+        run = run_of(fmu, recorder)
         run.begin()
         if run.ended:
             fmu.free()
@@ -111,11 +107,15 @@ def bad_steps(fmu: Any, recorder: Recorder) -> None:
 
 def derivatives(fmu: Any, recorder: Recorder) -> None:
     """Directional derivatives are numbers, equal after another call, and the adjoint ones are their transpose."""
-    _instantiate(fmu, recorder)
-    run = _run(fmu, recorder)
+    instantiate(fmu, recorder)
+    run = run_of(fmu, recorder)
     run.begin()
     run.advance(1)
     for unknown, reference, knowns in fmu.plan["jacobian"] if not run.ended else ():
+        if not fmu.plan["directional"]:
+            row = fmu.directional([reference], knowns, [1.0], adjoint=True)
+            run.require_numbers(f"An adjoint derivative of {unknown!r}", row)
+            continue
         row = [fmu.directional([reference], [known], [1.0])[0] for known in knowns]
         if any(math.isnan(slope) for slope in row):
             text = f"A directional derivative of {unknown!r} is NaN: {row[:10]}."
@@ -145,20 +145,17 @@ EXPERIMENTS = {
     "token": token,
     "bad_steps": bad_steps,
     "derivatives": derivatives,
+    "start_values": start_values,
+    "output_orders": output_orders,
+    "input_derivatives": input_derivatives,
+    "evaluation": evaluation,
+    "element_dependencies": element_dependencies,
+    "dependencies": dependencies,
 }
 
 
-def _instantiate(fmu: Any, recorder: Recorder) -> None:
-    if not fmu.instantiate(fmu.plan["token"]):
-        raise recorder.stop("run.instantiate", f"The FMU cannot be instantiated with its own token: {fmu.said()}.")
-
-
-def _run(fmu: Any, recorder: Recorder) -> Run:
-    return RUNS[fmu.plan["kind"]](fmu, recorder)
-
-
 def _whole(fmu: Any, recorder: Recorder) -> tuple[list[bytes], list[Bits], bool]:
-    run = _run(fmu, recorder)
+    run = run_of(fmu, recorder)
     run.begin()
     values = run.read_all()
     run.point()

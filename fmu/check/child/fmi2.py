@@ -195,15 +195,28 @@ class Fmi2(Library):
         rows, columns = (c.c_uint * len(unknowns))(*unknowns), (c.c_uint * len(knowns))(*knowns)
         given, found = (c.c_double * len(seed))(*seed), (c.c_double * len(unknowns))()
         sizes = c.c_size_t(len(unknowns)), c.c_size_t(len(knowns))
-        self.do("GetDirectionalDerivative", rows, sizes[0], columns, sizes[1], given, found)
+        self.do("GetDirectionalDerivative", rows, sizes[0], columns, sizes[1], given, found, may_discard=True)
         return list(found)
 
     def output_derivatives(self, references: list[int]) -> list[float]:
         """Return the first time derivatives of outputs."""
         array, found = (c.c_uint * len(references))(*references), (c.c_double * len(references))()
         orders = (c.c_int * len(references))(*[1] * len(references))
-        self.do("GetRealOutputDerivatives", array, c.c_size_t(len(references)), orders, found)
+        self.do("GetRealOutputDerivatives", array, c.c_size_t(len(references)), orders, found, may_discard=True)
         return list(found)
+
+    # Calls that capability flags claim; each returns its status.
+
+    def output_derivative(self, output: Variable, order: int) -> int:
+        """Ask for one time derivative of an output."""
+        reference, orders, found = (c.c_uint * 1)(output.reference), (c.c_int * 1)(order), (c.c_double * 1)()
+        shown = f"{output.name}, order {order}"
+        return self.call("GetRealOutputDerivatives", reference, c.c_size_t(1), orders, found, shown=shown)
+
+    def input_derivative(self, given: Variable) -> int:
+        """Set the first time derivative of an input to zero."""
+        reference, orders, value = (c.c_uint * 1)(given.reference), (c.c_int * 1)(1), (c.c_double * 1)(0.0)
+        return self.call("SetRealInputDerivatives", reference, c.c_size_t(1), orders, value, shown=given.name)
 
 
 def _filled(message: bytes | None, first: int | None) -> bytes | None:

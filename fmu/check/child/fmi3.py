@@ -202,15 +202,43 @@ class Fmi3(Library):
         found = (c.c_double * (len(knowns) if adjoint else len(unknowns)))()
         sizes = c.c_size_t(len(unknowns)), c.c_size_t(len(knowns)), c.c_size_t(len(given)), c.c_size_t(len(found))
         name = "GetAdjointDerivative" if adjoint else "GetDirectionalDerivative"
-        self.do(name, rows, sizes[0], columns, sizes[1], given, sizes[2], found, sizes[3])
+        self.do(name, rows, sizes[0], columns, sizes[1], given, sizes[2], found, sizes[3], may_discard=True)
         return list(found)
 
     def output_derivatives(self, references: list[int]) -> list[float]:
         """Return the first time derivatives of outputs."""
         size = c.c_size_t(len(references))
         array, found = (c.c_uint32 * len(references))(*references), (c.c_double * len(references))()
-        self.do("GetOutputDerivatives", array, size, (c.c_int32 * len(references))(*[1] * len(references)), found, size)
+        orders = (c.c_int32 * len(references))(*[1] * len(references))
+        self.do("GetOutputDerivatives", array, size, orders, found, size, may_discard=True)
         return list(found)
+
+    # Calls that capability flags claim; each returns its status.
+
+    def output_derivative(self, output: Variable, order: int) -> int:
+        """Ask for one time derivative of an output."""
+        reference, orders, found = (c.c_uint32 * 1)(output.reference), (c.c_int32 * 1)(order), (c.c_double * 1)()
+        one, shown = c.c_size_t(1), f"{output.name}, order {order}"
+        return self.call("GetOutputDerivatives", reference, one, orders, found, one, shown=shown)
+
+    def evaluate(self) -> int:
+        """Evaluate the discrete states."""
+        return self.call("EvaluateDiscreteStates")
+
+    def number_of_dependencies(self, unknown: Variable) -> tuple[int, int]:
+        """Return the status, and how many dependencies an unknown has."""
+        size = c.c_size_t()
+        status = self.call(
+            "GetNumberOfVariableDependencies", c.c_uint32(unknown.reference), c.byref(size), shown=unknown.name
+        )
+        return status, size.value
+
+    def dependencies(self, unknown: Variable, size: int) -> int:
+        """Ask for the dependencies of an unknown."""
+        elements, others = (c.c_size_t * max(size, 1))(), (c.c_size_t * max(size, 1))()
+        references, kinds = (c.c_uint32 * max(size, 1))(), (c.c_int * max(size, 1))()
+        given = (c.c_uint32(unknown.reference), elements, references, others, kinds, c.c_size_t(size))
+        return self.call("GetVariableDependencies", *given, shown=unknown.name)
 
     def activate(self, clock: Variable, t: float) -> None:
         """Activate the model partition of a clock."""
