@@ -253,9 +253,9 @@ class ReachableSets:
 
 def _distinct(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Directions, shape (p, count), without those that nearly equal an earlier one or its opposite."""
-    unit = directions / np.linalg.norm(directions, axis=0)
-    leading = unit[np.abs(unit).argmax(axis=0), np.arange(unit.shape[1])]
-    _, first = np.unique(np.round(unit / leading, 2), axis=1, return_index=True)
+    leading = directions[np.abs(directions).argmax(axis=0), np.arange(directions.shape[1])]
+    scaled = directions / np.where(leading != 0.0, leading, 1.0)
+    _, first = np.unique(np.round(scaled, 2), axis=1, return_index=True)
     return directions[:, np.sort(first)]
 
 

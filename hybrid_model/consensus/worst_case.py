@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +16,9 @@ from hybrid_model.consensus.scenario_data import Scenario
 
 __all__ = ["WorstCase", "starting_directions", "worst_case"]
 
-_STARTS, _MOST_STARTS = 6, 1024
-"""Random directions: the first, doubled for each agent, but no more than the second."""
+_LEAST_STARTS, _STARTS, _START_WORK = 48, 6, 65536
+"""Random directions: the second, doubled for each agent, but not so many that all of them cost more than the third by
+the square of the number of agents; the first at the least."""
 
 _PATIENCE = 3
 _KEPT = 12
@@ -29,6 +31,9 @@ _MOST_ROUGH = 200
 _PROMISING = 10
 _FINALISTS = 3
 _MOST_STEPS = 200
+
+_Found: TypeAlias = tuple[float, NDArray[np.float64]]
+"""A norm, and directions, the farthest first."""
 
 
 @dataclass(frozen=True)
@@ -83,40 +88,81 @@ def worst_case(
     fine = coarse
     if resolution < coarse.resolution:
         fine = ReachableSets(scenario, period, decay, resolution, periodic=periodic)
-    starts = starting_directions(network.agents)
-    indices = coarse.candidates(scenario)
     basis = disagreement_basis(network.agents)
     pairs = np.stack([basis[i - 1] - basis[j - 1] for i, j in network.edges], axis=1)
-
-    # A first look at every time; then from the farthest points found there; then from everywhere at the best times.
-    look = np.hstack((pairs, starts[:, :_FEW]))
-    looks = [coarse.support(int(index), look, _ROUGH) for index in indices]
-    widths = np.stack([values[: pairs.shape[1]] for values, _ in looks])
-    norms = np.stack([coarse.norms(points) for _, points in looks])
-    rough = {}
-    for place in np.argsort(-norms.max(axis=1))[:_MOST_ROUGH].tolist():
-        farthest = looks[place][1][:, np.argsort(-norms[place])[:_FEW]]
-        rough[place] = coarse.radius(int(indices[place]), farthest, _ROUGH)
-    times = np.append(coarse.times[indices], period)
-    promising = sorted(rough, key=lambda place: -rough[place][0])[:_PROMISING]
-    peaks = {k: _refine(coarse, times, k, _length(coarse, rough[k][1]))[0] for k in promising}
-    finalists = sorted(promising, key=lambda place: -peaks[place])[:_FINALISTS]
-    pool = np.hstack([starts, *(rough[place][1] for place in finalists)])
-    trials = [coarse.radius(int(indices[place]), pool, _ROUGH, _PATIENCE)[1][:, :_KEPT] for place in finalists]
-    # What is found from everywhere at the best times is tried at the others.
-    pool = np.hstack(trials)
-    second = sorted(rough, key=lambda place: -rough[place][0])[:_MOST_SECOND]
-    again = {place: coarse.radius(int(indices[place]), pool, _ROUGH) for place in second}
-    finalists = sorted(second, key=lambda place: -again[place][0])[:_FINALISTS]
-    tried = {place: _refine(fine, times, place, _length(fine, again[place][1])) for place in finalists}
-    radius, time = max(tried.values())
+    search = _Search(coarse, fine, coarse.candidates(scenario), period, pairs, starting_directions(network.agents))
     threshold = scenario.trigger.threshold if threshold is None else threshold
-    found = {}
-    for column, pair in enumerate(network.edges):
-        along = pairs[:, column : column + 1]
-        places = np.argsort(-widths[:, column])[:_FINALISTS].tolist()
-        found[pair] = threshold * max(_refine(fine, times, place, _width(fine, along))[0] for place in places)
-    return WorstCase(threshold * radius, found, time, fine.resolution)
+    radius, time = search.radius()
+    widths = {pair: threshold * search.width(column) for column, pair in enumerate(network.edges)}
+    return WorstCase(threshold * radius, widths, time, fine.resolution)
+
+
+class _Search:
+    """Suprema over times and directions: many of both on the coarse grid, the best of them on the fine one.
+
+    Candidate times are known by their places among `indices`. Norms are looked at from a few directions at every time;
+    then from the farthest points found there; then from everywhere at the best times; and what is found there is tried
+    at the other times.
+    """
+
+    def __init__(
+        self,
+        coarse: ReachableSets,
+        fine: ReachableSets,
+        indices: NDArray[np.intp],
+        period: float,
+        pairs: NDArray[np.float64],
+        starts: NDArray[np.float64],
+    ) -> None:
+        self._coarse, self._fine, self._pairs, self._starts = coarse, fine, pairs, starts
+        self._indices = [int(index) for index in indices]
+        self._times = np.append(coarse.times[indices], period)
+        look = np.hstack((pairs, starts[:, :_FEW]))
+        looks = [coarse.support(index, look, _ROUGH) for index in self._indices]
+        self._widths = np.stack([values[: pairs.shape[1]] for values, _ in looks])
+        self._points = [points for _, points in looks]
+
+    def radius(self) -> tuple[float, float]:
+        """Largest norm and its time [s]."""
+        rough = self._rough()
+        ranked = _best(rough, len(rough))
+        peaks = {
+            place: (self._peak(self._coarse, place, rough[place][1]), rough[place][1]) for place in ranked[:_PROMISING]
+        }
+        pool = self._everywhere(_best(peaks, _FINALISTS), rough)
+        again = {place: self._from(place, pool) for place in ranked[:_MOST_SECOND]}
+        return max(self._peak(self._fine, place, again[place][1]) for place in _best(again, _FINALISTS))
+
+    def width(self, column: int) -> float:
+        """Largest distance of a pair; along its one direction only the time is searched."""
+        along = self._pairs[:, column : column + 1]
+        places = np.argsort(-self._widths[:, column])[:_FINALISTS].tolist()
+        return max(_refine(self._fine, self._times, place, _width(self._fine, along))[0] for place in places)
+
+    def _rough(self) -> dict[int, _Found]:
+        """The times with the largest norms at the first look -> norms and directions from the farthest points there."""
+        norms = np.stack([self._coarse.norms(points) for points in self._points])
+        return {
+            place: self._from(place, self._points[place][:, np.argsort(-norms[place])[:_FEW]])
+            for place in np.argsort(-norms.max(axis=1))[:_MOST_ROUGH].tolist()
+        }
+
+    def _from(self, place: int, directions: NDArray[np.float64]) -> _Found:
+        return self._coarse.radius(self._indices[place], directions, _ROUGH)
+
+    def _everywhere(self, places: list[int], rough: dict[int, _Found]) -> NDArray[np.float64]:
+        """The best directions at some times, searched from all starts."""
+        pool = np.hstack([self._starts, *(rough[place][1] for place in places)])
+        found = [self._coarse.radius(self._indices[place], pool, _ROUGH, _PATIENCE) for place in places]
+        return np.hstack([directions[:, :_KEPT] for _, directions in found])
+
+    def _peak(self, sets: ReachableSets, place: int, directions: NDArray[np.float64]) -> tuple[float, float]:
+        return _refine(sets, self._times, place, _length(sets, directions))
+
+
+def _best(found: Mapping[int, tuple[Any, Any]], count: int) -> list[int]:
+    """The places with the largest values."""
+    return sorted(found, key=lambda place: found[place][0], reverse=True)[:count]
 
 
 def _length(sets: ReachableSets, direction: NDArray[np.float64]) -> Callable[[int], float]:
@@ -153,7 +199,7 @@ def starting_directions(agents: int) -> NDArray[np.float64]:
     basis = disagreement_basis(agents)
     pairs = [basis[i] - basis[j] for i in range(agents) for j in range(i)]
     # The number of local maxima grows about so with the number of agents.
-    count = min(_MOST_STARTS, _STARTS * 2 ** min(agents, 10))
+    count = max(_LEAST_STARTS, min(_STARTS * 2 ** min(agents, 20), _START_WORK // agents**2))
     random = np.random.default_rng(2018).standard_normal((count, agents - 1))
     ordered = [*random[:_FEW], *pairs, *random[_FEW:]]
     return np.stack(ordered, axis=1)
