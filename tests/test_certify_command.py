@@ -2,6 +2,7 @@
 
 import json
 
+import matplotlib.pyplot as plt
 import pytest
 
 from cosim.cli.main import main
@@ -18,7 +19,7 @@ kind = "constant"
 value = {value}
 [trigger]
 kind = "{kind}"
-threshold = 0.2
+{threshold}
 {more}
 """
 
@@ -27,9 +28,9 @@ threshold = 0.2
 def scenario(tmp_path):
     """Write a scenario with some entries changed."""
 
-    def write(value="1.0", kind="static", more=""):
+    def write(value="1.0", kind="static", threshold="threshold = 0.2", more=""):
         path = tmp_path / "small.toml"
-        path.write_text(BASE.format(value=value, kind=kind, more=more))
+        path.write_text(BASE.format(value=value, kind=kind, threshold=threshold, more=more))
         return str(path)
 
     return write
@@ -91,3 +92,29 @@ def test_thresholds_that_vanish_too_fast_are_named_and_cut_the_run(scenario, cap
     assert "The run ended before the stop time" in notes
     assert main(["certify", path, "--max-jumps", "0"]) == 2
     assert "--max-jumps 0: give a whole number of jumps, 1 or more." in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("changes", "missing"),
+    [
+        ({}, ()),
+        ({"value": "[1.0, 0.0]"}, ()),
+        ({"kind": "dynamic", "more": "decay = 3.0"}, ()),
+        ({"value": "1e-6"}, ()),
+        ({"kind": "relative", "threshold": "", "more": "sigma = 0.5\nfloor = 0.01"}, ("errors",)),
+    ],
+    ids=["plain", "disconnected", "vanishing", "without broadcasts", "relative"],
+)
+def test_figures_are_written_with_the_certificates(scenario, tmp_path, capsys, changes, missing):
+    out = tmp_path / "found"
+    assert main(["certify", scenario(**changes), "--json", "--max-jumps", "200", "--out", str(out)]) == 0
+    assert json.loads((out / "certificates.json").read_text()) == json.loads(capsys.readouterr().out)
+    names = {"states", "broadcasts", "gaps", "errors", "conservatism"} - set(missing)
+    drawn = {path.stem for path in out.glob("*.png")}
+    # Without a number to measure bounds by there is no conservatism to draw.
+    assert names - {"conservatism"} <= drawn <= names
+    assert {path.stem for path in out.glob("*.pdf")} == drawn
+    for path in out.glob("*.png"):
+        pixels = plt.imread(path)
+        assert min(pixels.shape[:2]) > 200
+        assert pixels.std() > 0.01

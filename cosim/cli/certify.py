@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import hybrid_model as hm
@@ -12,6 +13,7 @@ from cosim.cli.exits import Exit, UsageError, exit_of, progress
 from fmu.compiled import compiled
 from hybrid_model.consensus.certified import Certified
 from hybrid_model.consensus.certify import Certificates, certify
+from hybrid_model.consensus.figure_certificates import save_certificate_figures
 from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.scenario import load_scenario
 
@@ -45,6 +47,9 @@ def add_parser(commands: Any) -> None:
         default=_MOST_JUMPS,
         help="jumps (broadcasts and breakpoints) after which the run beside the bounds ends (default %(default)s)",
     )
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="write certificates.json, and figures of the run with its bounds, there"
+    )
     parser.set_defaults(run=run)
 
 
@@ -58,7 +63,12 @@ def run(options: argparse.Namespace) -> int:
     arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time, zeno=zeno)
     progress("computing the bounds")
     found = certify(scenario, arc)
-    print(json.dumps(_document(found, details=options.details), indent=2) if options.json else _text(found))
+    document = json.dumps(_document(found, details=options.details), indent=2)
+    if options.out:
+        progress("drawing the figures")
+        save_certificate_figures(found, arc, options.out)
+        (options.out / "certificates.json").write_text(document + "\n", encoding="utf-8")
+    print(document if options.json else _text(found))
     # Bounds are there also where the thresholds vanish too fast for the run; a note says how far it came.
     return Exit.DONE if arc.stop is hm.Stop.JUMPS else exit_of(arc.stop.name)
 

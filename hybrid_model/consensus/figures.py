@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from hybrid_model.arc import HybridArc
@@ -209,16 +210,48 @@ def save_paper_figures(
     list of Path
         The files written.
     """
+    figures = {
+        f"{kind}_states": in_column(lambda ax: plot_states(scenario, arc, ax)),
+        f"{kind}_edge_norm": in_column(lambda ax: plot_edge_norm(scenario, arc, bounds, ax)),
+    }
+    return save_figures(figures, folder)
+
+
+def in_column(plot: Callable[[Axes], object], columns: float = 1.0) -> Callable[[], Figure]:
+    """What draws a figure so many columns wide with one pair of axes, on which `plot` draws."""
+
+    def draw() -> Figure:
+        figure, ax = plt.subplots(figsize=(columns * COLUMN[0], COLUMN[1]))
+        plot(ax)
+        return figure
+
+    return draw
+
+
+def save_figures(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:
+    """Write figures in a journal's style as PNG and PDF.
+
+    Parameters
+    ----------
+    figures : mapping
+        Name of the file -> what draws the figure.
+    folder : Path
+        Where to write.
+
+    Returns
+    -------
+    list of Path
+        The files written.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     # The font's own time stamp is none of the reader's business; the subsetter warns about it for every figure.
     logging.getLogger("fontTools").setLevel(logging.ERROR)
     written = []
     with plt.rc_context(JOURNAL):
-        for name, draw in (("states", plot_states), ("edge_norm", lambda s, a, ax: plot_edge_norm(s, a, bounds, ax))):
-            figure, ax = plt.subplots(figsize=COLUMN)
-            draw(scenario, arc, ax=ax)
+        for name, draw in figures.items():
+            figure = draw()
             for suffix, metadata in ((".png", {"Software": None}), (".pdf", {"CreationDate": None})):
-                written.append(folder / f"{kind}_{name}{suffix}")
+                written.append(folder / f"{name}{suffix}")
                 figure.savefig(written[-1], metadata=metadata)
             plt.close(figure)
     return written
