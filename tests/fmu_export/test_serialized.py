@@ -239,7 +239,7 @@ print("taken", taken, "equal", repr(again) == repr(fresh))
 
 
 # In Co-Simulation a state with huge rates costs a call all the solver steps that it may take.
-MANY = {label: 2000 if setting["kind"] == "me" else 400 for label, setting in SETTINGS.items()}
+MANY = {label: 2000 if setting["kind"] == "me" else 150 for label, setting in SETTINGS.items()}
 
 
 @pytest.mark.parametrize(
