@@ -116,7 +116,20 @@ def test_a_module_that_fails_is_named_with_its_error(here, capsys, content, sent
     assert not (here / "out").exists()
 
 
-@pytest.mark.parametrize("target", ["fading:Nothing", "nowhere:Decay", ":Decay", "fading:", ".fading:Decay", "os:sep"])
+@pytest.mark.parametrize(
+    "target",
+    [
+        "fading:Nothing",
+        "nowhere:Decay",
+        ":Decay",
+        "fading:",
+        ".fading:Decay",
+        "os:sep",
+        "fading.py:Nothing",
+        "fading.py:",
+        "nowhere.py:Decay",
+    ],
+)
 def test_targets_that_are_not_there_are_wrong_usage(here, capsys, target):
     assert main(["export", target, "--out", "out"]) == 2
     assert target in capsys.readouterr().err

@@ -176,8 +176,13 @@ def _is_about_the_target(error: Exception, module: str, name: str) -> bool:
     if isinstance(error, ModuleNotFoundError):
         return f"{module}.".startswith(f"{error.name}.")
     if isinstance(error, AttributeError):
-        return module in sys.modules and error.obj is sys.modules[module] and error.name == name
+        return error.name == name and isinstance(error.obj, ModuleType) and _is_file_or_name(error.obj, module)
     return not module or module.startswith(".")
+
+
+def _is_file_or_name(found: ModuleType, module: str) -> bool:
+    """Whether a module is the one that was asked for, by its name or by its file."""
+    return module == (found.__spec__.origin if found.__spec__ and module.endswith(_SOURCE) else found.__name__)
 
 
 def _failed(module: str, error: BaseException) -> ExportError:

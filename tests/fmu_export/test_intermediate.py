@@ -355,6 +355,53 @@ def test_the_countdown_clock_tells_how_long_it_is_to_the_next_event(label, binar
     component.free()
 
 
+class Filling(hm.HybridAutomaton):
+    """Rises to one at a rate that is given at events: without it no event is foreseen."""
+
+    x = hm.State(0.0, output=True)
+    rate = hm.Input(0.0, discrete=True)
+
+    def flow_map(self, s):
+        return {"x": s.rate}
+
+    def jump_set(self, s):
+        return s.x - 1.0
+
+    def jump_map(self, s):
+        return {"x": 0.0}
+
+
+def settled(component):
+    """Out of the updates of Event Mode; where the countdown clock then is."""
+    while component.update().again:
+        pass
+    return interval(component)
+
+
+def test_an_interval_that_was_told_stays_known_until_the_clock_ticks(exported):
+    """FMI 3.0.2, fmi3GetInterval: not yet known is for clocks of which no interval was told since they ticked."""
+    component = instance({"3.0": Binary(exported(Filling(), "filling"))}, "3.0 CS")
+    assert component.enter_initialization(0.0) == OK
+    component.do("ExitInitializationMode")
+    assert settled(component)[::2] == (OK, NOT_YET_KNOWN)
+    component.set("rate", 1.0)
+    assert settled(component) == (OK, pytest.approx(1.0, abs=1e-12), CHANGED)
+    component.do("EnterStepMode")
+    component.step(0.0, 0.25)
+    component.do("EnterEventMode")
+    component.set("rate", 0.0)
+    status, quiet, qualifier = settled(component)
+    assert (status, qualifier) == (OK, CHANGED)
+    assert quiet > 0.75  # a time at which nothing happens; the event that was told of will not come
+    component.set("rate", 3.0)
+    assert settled(component) == (OK, pytest.approx(0.25, abs=1e-12), CHANGED)
+    component.set("rate", 0.0)
+    clock = references([component.binary.reference("next_event")])
+    component.do("SetClock", clock, c.c_size_t(1), (c.c_bool * 1)(True))
+    assert settled(component)[::2] == (OK, NOT_YET_KNOWN)
+    component.free()
+
+
 def test_a_tick_too_early_does_nothing(binaries):
     component = instance(binaries["ramps"], "3.0 CS")
     component.begin(limit_a=0.5)
