@@ -30,10 +30,12 @@ class Exchange:
         Stops so much before each state event, s.
     watch : bool
         Look at the event indicators; otherwise only at what fmi*CompletedIntegratorStep says.
+    by_name : bool
+        Set states one by one by the functions for variables, not by fmi*SetContinuousStates.
     """
 
-    def __init__(self, component, *, short=0.0, watch=True):
-        self.component, self.short, self.watch = component, short, watch
+    def __init__(self, component, *, short=0.0, watch=True, by_name=False):
+        self.component, self.short, self.watch, self.by_name = component, short, watch, by_name
         self.binary = component.binary
         self.n = self.binary.n_states
         self.n_indicators = len(component.binary.description.eventIndicators or ())
@@ -43,7 +45,11 @@ class Exchange:
 
     def put(self, t, x):
         self.component.do("SetTime", c.c_double(t))
-        self.component.do("SetContinuousStates", doubles(x), c.c_size_t(self.n))
+        if not self.by_name:
+            self.component.do("SetContinuousStates", doubles(x), c.c_size_t(self.n))
+            return
+        for name, value in zip(self.binary.state_elements, x, strict=True):
+            self.component.set(name, value)
 
     def flow(self, t, x):
         self.put(t, x)

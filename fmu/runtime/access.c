@@ -16,7 +16,9 @@ static bool may_be_set(const ModelVariable *variable, int mode)
     case BANK_INPUT: return mode != MODE_CONFIGURATION && (mode != MODE_INTERMEDIATE || !variable->discrete);
     case BANK_PARAMETER:
     case BANK_OPTION: return before_start;
-    case BANK_STATE:
+    /* An importer that integrates may set a state by its name as well as all of them at once (2.0.1, section 3.2.3,
+       condition 5; 3.0.2, section 3.2.1, by its table of functions and by what later became its text). */
+    case BANK_STATE: return (before_start && !variable->calculated) || mode == MODE_CONTINUOUS;
     case BANK_DISCRETE: return before_start && !variable->calculated;
     case BANK_SIZE: return mode == MODE_CONFIGURATION;
     default: return false;

@@ -62,6 +62,9 @@ void engine_set(Engine *engine, Bank bank, size_t index, double value)
     if (values[index] == value)
         return;
     values[index] = value;
+    /* Guards that were reached by rounding were so in the state before. */
+    if (bank == BANK_STATE)
+        clear_levels(engine, &engine->live);
     changed(engine);
 }
 

@@ -163,13 +163,13 @@ def test_freeing_in_every_mode_and_freeing_nothing(label, binaries):
 
 
 @pytest.mark.parametrize("label", SETTINGS)
-def test_only_inputs_are_set_while_running(label, binaries):
+def test_only_inputs_and_what_an_importer_integrates_are_set_while_running(label, binaries):
     setting = SETTINGS[label]
     for mode in modes_of(setting):
         component = in_mode(binaries, label, mode)
-        settable = mode in ("instantiated", "initialization")
-        for name in ("limit_a", "a", "count_a"):
-            assert (mode, component.try_set(name, 1)) == (mode, OK if settable else ERROR)
+        at_start = {"instantiated", "initialization"}
+        for name, modes in (("limit_a", at_start), ("a", {*at_start, "continuous"}), ("count_a", at_start)):
+            assert (mode, component.try_set(name, 1)) == (mode, OK if mode in modes else ERROR)
         for name in ("time", "der(a)"):
             assert component.try_set(name, 1.0) == ERROR
         assert all(component.binary.function("Set")[:7] in text for text in component.errors)

@@ -62,6 +62,54 @@ def test_a_run_with_everything_is_that_of_the_automaton(fmi, short, make):
 
 
 @VERSIONS
+def test_states_may_be_set_by_name(fmi, make):
+    """The same bits as with all states at once: nothing of the state before is left in a cache or a prediction."""
+    runs = []
+    for by_name in (False, True):
+        component = make("mix", fmi)
+        exchange = Exchange(component, by_name=by_name)
+        record = exchange.run([0.0, 0.6, 1.2], component.begin())
+        runs.append(([x.tolist() for _, x in record.samples], component.jumps, component.values()))
+        component.free()
+    assert runs[0] == runs[1]
+    assert len(runs[0][1]) > 3
+
+
+@VERSIONS
+def test_a_state_set_by_name_renews_rates_outputs_and_indicators(fmi, make):
+    component = make("ball", fmi)
+    component.begin()
+    assert component.vector("GetContinuousStateDerivatives", 2) == (OK, [0.0, -9.81])
+    below, above = component.vector("GetEventIndicators", 2)[1]
+    assert above == -below == 1.0
+    component.set("v", -3.0)
+    component.set("h", 0.25)
+    assert component.vector("GetContinuousStates", 2) == (OK, [0.25, -3.0])
+    assert component.vector("GetContinuousStateDerivatives", 2) == (OK, [-3.0, -9.81])
+    assert component.vector("GetEventIndicators", 2) == (OK, [-0.25, 0.25])
+    assert component.get("h") == 0.25
+    assert component.completed() == (OK, False, False)
+    component.set("h", 0.0)
+    assert component.completed() == (OK, True, False)
+    component.free()
+
+
+@VERSIONS
+def test_a_state_set_by_name_is_not_taken_for_one_that_has_reached_a_guard(fmi, make):
+    """A guard that counts as reached, since an event was told within the tolerance before it, does so there only."""
+    component = make("ramps", fmi)
+    component.begin(limit_a=0.3)
+    component.do("SetTime", c.c_double(0.1))
+    component.set("a", 0.3 - 5e-10)
+    component.do("EnterEventMode")
+    component.do("EnterContinuousTimeMode")
+    assert component.completed() == (OK, True, False)
+    component.set("a", 0.3 - 4e-10)
+    assert component.completed() == (OK, False, False)
+    component.free()
+
+
+@VERSIONS
 @pytest.mark.parametrize(("ahead", "n"), [(1e-6, 0), (1e-8, 0), (5e-10, 1), (1e-15, 1)])
 def test_where_flow_has_priority_a_border_of_both_sets_is_reached_a_little_before_it(fmi, ahead, n, make):
     component = make("patient", fmi)
@@ -278,7 +326,8 @@ def test_times_and_states_that_are_no_numbers_are_refused(fmi, value, make):
     before = component.values()
     assert component.call("SetTime", c.c_double(value)) == ERROR
     assert component.call("SetContinuousStates", doubles([0.1, value]), c.c_size_t(2)) == ERROR
-    assert ["'b'" in text for text in component.errors] == [False, True]
+    assert component.try_set("b", value) == ERROR
+    assert ["'b'" in text for text in component.errors] == [False, True, True]
     assert component.values() == before
     component.free()
 
