@@ -2,49 +2,33 @@
 
 from __future__ import annotations
 
-import ctypes
-import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    addLoggerProxy,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-    fmi2Discard,
-    fmi2LastSuccessfulTime,
-    fmi2Terminated,
-    printLogMessage,
-)
+from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
 
 from cosim.fmu_instance import Advance, FmuInstance, Getter
-
-# fmpy formats the messages of all FMUs for one logger of the process, the last that it was given. So there is one
-# logger, and it tells the instances apart by the environment that each gives to its FMU.
-_listeners: dict[int, Callable[[str], None]] = {}
-_environments = itertools.count(1)
+from fmu.importer.callbacks import Callbacks
+from fmu.importer.loading import load_binary
 
 
 class Fmi2Instance(FmuInstance):
     """An instance of an FMU of FMI 2.0; see `FmuInstance`."""
 
-    def _load(self, description: Any, **arguments: Any) -> Any:
-        return FMU2Slave(guid=description.guid, **arguments)
+    def _load(self, description: Any, folder: Path, **arguments: Any) -> Any:
+        return load_binary(FMU2Slave, folder, guid=description.guid, **arguments)
 
     def instantiate(self, events: bool) -> None:
         """See `FmuInstance.instantiate`."""
         if events:
             raise self._no_events()
-        self._environment = next(_environments)
-        _listeners[self._environment] = self.log
-        callbacks = fmi2CallbackFunctions(logger=_logger, componentEnvironment=self._environment)
-        addLoggerProxy(ctypes.byref(callbacks))
+        self._callbacks = Callbacks(self.log)
         try:
-            self.fmu.instantiate(callbacks=callbacks)
+            self.fmu.instantiate(callbacks=self._callbacks.functions)
         except Exception:
-            del _listeners[self._environment]
+            self._callbacks.release()
             raise
 
     def enter_initialization(self, t_start: float, t_stop: float) -> None:
@@ -86,18 +70,7 @@ class Fmi2Instance(FmuInstance):
     def free(self) -> None:
         """See `FmuInstance.free`."""
         self.fmu.fmi2FreeInstance(self.fmu.component)
-        del _listeners[self._environment]
-
-
-def _log(environment: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:
-    listener = _listeners.get(environment or 0)
-    if listener is None:  # of somebody else's instance, made by fmpy
-        printLogMessage(environment, name, status, category, message)
-    else:
-        listener((message or b"").decode("utf-8", "replace"))
-
-
-_logger = fmi2CallbackLoggerTYPE(_log)
+        self._callbacks.release()
 
 
 def _access(variable: Any) -> str:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
 from cosim.fmu_instance import Advance, FmuInstance, Getter
+from fmu.importer.loading import load_binary
 
 
 class Fmi3Instance(FmuInstance):
     """An instance of an FMU of FMI 3.0; see `FmuInstance`."""
 
-    def _load(self, description: Any, **arguments: Any) -> Any:
-        return FMU3Slave(guid=description.instantiationToken, **arguments)
+    def _load(self, description: Any, folder: Path, **arguments: Any) -> Any:
+        return load_binary(FMU3Slave, folder, guid=description.instantiationToken, **arguments)
 
     def instantiate(self, events: bool) -> None:
         """See `FmuInstance.instantiate`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from cosim.errors import CosimError
@@ -43,22 +44,22 @@ class FmuInstance(ABC):
     ----------
     description : fmpy.model_description.ModelDescription
         Of the FMU.
-    folder : str
-        The FMU, extracted.
+    folder : Path
+        The FMU, unpacked.
     name : str
         Of the instance.
     log : callable
         Told each message of the FMU.
     """
 
-    def __init__(self, description: Any, folder: str, name: str, log: Callable[[str], None]) -> None:
+    def __init__(self, description: Any, folder: Path, name: str, log: Callable[[str], None]) -> None:
         self.name = name
         identifier = description.coSimulation.modelIdentifier
-        self.fmu = self._load(description, unzipDirectory=folder, modelIdentifier=identifier, instanceName=name)
+        self.fmu = self._load(description, folder, modelIdentifier=identifier, instanceName=name)
         self.log = log
 
     @abstractmethod
-    def _load(self, description: Any, **arguments: Any) -> Any:
+    def _load(self, description: Any, folder: Path, **arguments: Any) -> Any:
         """Return fmpy's object, with the binary loaded."""
 
     @abstractmethod

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 import shutil
-import tempfile
 import weakref
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 
 from cosim.errors import CosimError
@@ -20,6 +18,9 @@ from cosim.fmu_instance import FmuInstance
 from cosim.fmu_variables import INTEGERS, NUMBERS, elements, ports, size
 from cosim.slave import Slave, Step, Termination, Update
 from fmu.check.archive import Archive
+from fmu.importer.folders import temporary_folder
+from fmu.importer.loading import read_description
+from fmu.importer.unpacking import unpack
 
 MAX_PARTS = 10_000
 """Most early returns within one communication step of a master that handles no events."""
@@ -47,8 +48,7 @@ class FmuSlave(Slave):
 
     def __init__(self, name: str, path: str | Path) -> None:
         try:
-            with Archive(path):  # found safe to extract
-                description = read_model_description(str(path))
+            description = read_description(path)
         except Exception as error:
             raise CosimError(f"{name}: {path} cannot be read as an FMU: {error}") from error
         self._kind = _kind(description)
@@ -114,10 +114,10 @@ class FmuSlave(Slave):
         """Load the FMU's binary, once for all runs; `start` does it if nobody has."""
         if self._loaded is None:
             assert self._kind is not None
-            folder = tempfile.mkdtemp()
+            folder = temporary_folder()
             try:
                 with Archive(self._path) as archive:
-                    archive.extract(Path(folder))
+                    unpack(archive, folder)
                 self._loaded = self._kind(self._description, folder, self.name, self._messages.append)
             except Exception as error:
                 shutil.rmtree(folder, ignore_errors=True)
@@ -237,6 +237,6 @@ def _interfaces(description: Any) -> str:
     return " and ".join(name for name, interface in offered.items() if interface is not None) or "no interface"
 
 
-def _unload(fmu: Any, folder: str) -> None:
+def _unload(fmu: Any, folder: Path) -> None:
     fmu.freeLibrary()
     shutil.rmtree(folder, ignore_errors=True)

@@ -9,7 +9,6 @@ import contextlib
 import ctypes
 import math
 import shutil
-import tempfile
 import weakref
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -18,12 +17,15 @@ from xml.etree import ElementTree
 
 import numpy as np
 import numpy.typing as npt
-from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 
 from fmu.check.archive import Archive
+from fmu.importer.callbacks import Callbacks
+from fmu.importer.folders import temporary_folder
+from fmu.importer.loading import load_binary, read_description
+from fmu.importer.unpacking import unpack
 
 FloatArray = npt.NDArray[np.float64]
 MAX_ITERATIONS = 1000
@@ -81,12 +83,12 @@ class FlowFunctions:
     def __init__(self, path: str | Path, start: Mapping[str, float] | None = None, *, t_start: float = 0.0) -> None:
         try:
             with Archive(path) as archive:
-                description = read_model_description(str(path))
+                description = read_description(path)
                 if description.modelExchange is None or description.fmiVersion == "1.0":
                     raise FlowError("it has no Model Exchange of FMI 2.0 or 3.0")
-                folder = tempfile.mkdtemp()
+                folder = temporary_folder()
                 weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
-                archive.extract(Path(folder))
+                unpack(archive, folder)
                 self._provides_derivatives = _provides_derivatives(archive.read("modelDescription.xml"))
             self._begin(description, folder, dict(start or {}), t_start)
         except Exception as error:
@@ -125,7 +127,7 @@ class FlowFunctions:
         """Free the instance and unload the binary; nothing works after it."""
         self._end()
 
-    def _begin(self, description: Any, folder: str, start: dict[str, float], t_start: float) -> None:
+    def _begin(self, description: Any, folder: Path, start: dict[str, float], t_start: float) -> None:
         self.name = str(description.modelName)
         self._fmi2 = description.fmiVersion == "2.0"
         interface = description.modelExchange
@@ -143,11 +145,14 @@ class FlowFunctions:
         )
         self._buffer = (ctypes.c_double * max(len(self.states), 1))()
         token = description.guid if self._fmi2 else description.instantiationToken
-        self._fmu = (FMU2Model if self._fmi2 else FMU3Model)(
-            guid=token, unzipDirectory=folder, modelIdentifier=interface.modelIdentifier, instanceName=self.name
+        self._fmu = load_binary(
+            FMU2Model if self._fmi2 else FMU3Model,
+            folder,
+            guid=token,
+            modelIdentifier=interface.modelIdentifier,
+            instanceName=self.name,
         )
-        self._instantiate()
-        self._end = weakref.finalize(self, self._fmu.freeInstance)
+        self._end = weakref.finalize(self, _free, self._fmu, self._instantiate())
         known = {variable.name: variable for variable in variables}
         for name, value in start.items():
             if name not in known:
@@ -157,13 +162,18 @@ class FlowFunctions:
         self._fmu.getContinuousStates(self._buffer, len(self.states))
         self.x, self.u = np.array(self._buffer[: len(self.states)]), self._get(self._u)
 
-    def _instantiate(self) -> None:
-        if self._fmi2:
-            # Messages are dropped: fmpy tells by an exception which function failed.
-            callbacks = fmi2CallbackFunctions(logger=_silence)
-            self._fmu.instantiate(callbacks=callbacks)
-        else:
+    def _instantiate(self) -> Callbacks | None:
+        # Messages are dropped: fmpy tells by an exception which function failed.
+        if not self._fmi2:
             self._fmu.instantiate(logMessage=lambda environment, status, category, message: None)
+            return None
+        callbacks = Callbacks(lambda message: None)
+        try:
+            self._fmu.instantiate(callbacks=callbacks.functions)
+        except Exception:
+            callbacks.release()
+            raise
+        return callbacks
 
     def _initialize(self, t_start: float) -> None:
         if self._fmi2:
@@ -224,9 +234,10 @@ class FlowFunctions:
         return list(self._fmu.getDirectionalDerivative(references, [known.valueReference], seed, *size))
 
 
-@fmi2CallbackLoggerTYPE  # type: ignore[untyped-decorator]
-def _silence(environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
-    pass
+def _free(fmu: Any, callbacks: Callbacks | None) -> None:
+    fmu.freeInstance()
+    if callbacks is not None:
+        callbacks.release()
 
 
 def _provides_derivatives(description: bytes) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import tempfile
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult
 from cosim.system import System
 from fmu.export import export_fmu
+from fmu.importer.folders import temporary_folder
 from hybrid_model.consensus.network import scenario_agents
 from hybrid_model.consensus.scenario import load_scenario
 from hybrid_model.consensus.scenario_data import Scenario
@@ -42,18 +43,21 @@ def add_parser(commands: Any) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     starts = start_values(options.start_value)
-    with tempfile.TemporaryDirectory() as folder:
+    folder = temporary_folder()
+    try:
         if Path(options.system).suffix == ".fmu":
             slave = FmuSlave(Path(options.system).stem, options.system)
             system, stop_time = System([slave], {}), _given(options.stop_time, slave.default_stop_time)
         else:
             scenario = load_scenario(options.system)
-            system, stop_time = _agents(scenario, Path(folder)), _given(options.stop_time, scenario.stop_time)
+            system, stop_time = _agents(scenario, folder), _given(options.stop_time, scenario.stop_time)
         if stop_time is None:
             raise UsageError(f"{options.system} proposes no stop time: give --stop-time.")
         for name, value in starts.items():
             _set_start(system, name, value)
         result = _run(system, stop_time, options)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
     if options.output_file:
         write_csv(options.output_file, result.times, result.signals)
     print(_text(result))

@@ -22,6 +22,7 @@ from fmu.check.rules_units import unit_findings
 from fmu.check.rules_variables import variable_findings
 from fmu.check.smoke import run_fmu
 from fmu.check.xml_file import XmlError, parse, require_size, schema_findings
+from fmu.importer.unpacking import unpack
 
 SAFETY = "FMI 3.0.2 section 2.5: ZIP with store or deflate, no encryption, '/' between folders"
 _SCHEMAS = {2: "fmi2/fmi2ModelDescription.xsd", 3: "fmi3/fmi3ModelDescription.xsd"}
@@ -92,7 +93,7 @@ def _check(archive: Archive, report: Report, run_limits: RunLimits | None) -> No
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-", ignore_cleanup_errors=True) as folder:
         unpacked = Path(folder) / "fmu"
         unpacked.mkdir()
-        archive.extract(unpacked)
+        unpack(archive, unpacked)
         executed, findings = run_fmu(unpacked, description, run_limits)
     report.executed = executed
     report.extend(findings)

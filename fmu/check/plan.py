@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 from fmu.check.child.experiments import POINTS
 from fmu.check.description import Description, Unknown, Variable, true
+from fmu.importer.unpacking import resource_location
 
 LARGEST_ARRAY = 1_000_000
 """Elements of an array that is read."""
@@ -37,16 +37,13 @@ def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> 
     """
     attributes = description.interfaces[kind]
     start, stop, step, points = _times(description, attributes)
-    resources = folder / "resources"
-    # FMI 3 wants a separator at the end of the path.
-    place = "" if not resources.is_dir() else f"{resources}{os.sep}" if description.major == 3 else str(resources)
     states = [description.referred(unknown.reference) for unknown in description.structure["derivatives"]]
     indicators = [description.referred(unknown.reference) for unknown in description.structure["indicators"]]
     return {
         "major": description.major,
         "kind": kind,
         "binary": str(binary),
-        "resources": place,
+        "resources": resource_location(folder, description.major),
         "token": description.token,
         "variables": [entry(description, variable) for variable in description.variables],
         "event_mode": kind == "CoSimulation" and true(attributes, "hasEventMode"),

@@ -1,7 +1,10 @@
 """FMUs of both versions as slaves, ours and somebody else's."""
 
 import math
+import os
 import subprocess
+import sys
+import time
 import zipfile
 from pathlib import Path
 
@@ -49,7 +52,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
   <ModelStructure><Outputs><Unknown index="1"/><Unknown index="5"/></Outputs></ModelStructure>
 </fmiModelDescription>
 """
-STUCK, ENDS, FAILS, CRAWLS = 1, 2, 3, 4
+STUCK, ENDS, FAILS, CRAWLS, DIES = 1, 2, 3, 4, 5
 
 
 @pytest.fixture(scope="module")
@@ -271,3 +274,30 @@ def test_an_fmu_for_another_machine_is_refused_when_it_is_loaded(other):
     slave = FmuSlave("other", other(member="binaries/win64/other.dll"))
     with pytest.raises(CosimError, match=r"other: .* cannot be loaded on this machine"):
         run(slave)
+
+
+def test_a_binary_that_cannot_be_loaded_leaves_this_process_where_it_is(tmp_path):
+    path, here = tmp_path / "other.fmu", os.getcwd()
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(
+            "modelDescription.xml", DESCRIPTION.format(version="2.0", kind="CoSimulation", guid="someone-else")
+        )
+        archive.writestr("binaries/linux64/other.so", "no library at all")
+    with pytest.raises(CosimError, match="cannot be loaded on this machine"):
+        FmuSlave("other", path).load()
+    assert os.getcwd() == here
+
+
+@pytest.mark.parametrize("behaviour", [0, DIES])
+def test_nothing_is_left_of_an_fmu_even_if_it_ends_the_process(behaviour, other, tmp_path):
+    place = tmp_path / "temporary"
+    place.mkdir()
+    command = [sys.executable, "-m", "cosim.cli.main", "cosim", str(other())]
+    command += ["--start-value", f"behaviour={behaviour}", "--step-size", "1"]
+    done = subprocess.run(command, env={**os.environ, "TMPDIR": str(place)}, capture_output=True, check=False)
+    assert (done.returncode == 0) == (behaviour == 0)
+    for _ in range(600):  # another process removes it, at its own speed
+        if not list(place.iterdir()):
+            break
+        time.sleep(0.05)
+    assert list(place.iterdir()) == []

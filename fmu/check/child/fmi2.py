@@ -5,10 +5,10 @@ from __future__ import annotations
 import ctypes as c
 import platform
 import sys
-from pathlib import Path
 from typing import Any
 
 from fmu.check.child.calls import DISCARD, OK, Library, Recorder, Step, Update, Variable
+from fmu.importer.memory import ALLOCATE, FREE, memory_functions
 
 TYPES: dict[str, tuple[str, Any]] = {
     "Real": ("Real", c.c_double),
@@ -20,8 +20,6 @@ TYPES: dict[str, tuple[str, Any]] = {
 # The logger is variadic.  Where variable arguments are passed as fixed ones are, the first of them can be read here.
 _LOGGER = c.CFUNCTYPE(None, c.c_void_p, c.c_char_p, c.c_int, c.c_char_p, c.c_char_p, c.c_void_p)
 _READS_ARGUMENTS = not (sys.platform == "darwin" and platform.machine() == "arm64")
-_ALLOCATE = c.CFUNCTYPE(c.c_void_p, c.c_size_t, c.c_size_t)
-_FREE = c.CFUNCTYPE(None, c.c_void_p)
 _FINISHED = c.CFUNCTYPE(None, c.c_void_p, c.c_int)
 _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 
@@ -29,8 +27,8 @@ _LAST_SUCCESSFUL_TIME, _TERMINATED = 2, 3
 class _Callbacks(c.Structure):
     _fields_ = [
         ("logger", _LOGGER),
-        ("allocate", _ALLOCATE),
-        ("free", _FREE),
+        ("allocate", ALLOCATE),
+        ("free", FREE),
         ("finished", _FINISHED),
         ("environment", c.c_void_p),
     ]
@@ -55,12 +53,11 @@ class Fmi2(Library):
 
     def __init__(self, plan: dict[str, Any], recorder: Recorder) -> None:
         super().__init__(plan, recorder)
-        # The memory functions are the C library's own: a Python function between would be the check's, not the FMU's.
-        memory = c.CDLL("msvcrt" if sys.platform == "win32" else None)
+        allocate, free = memory_functions()
         self._callbacks = _Callbacks(
             _LOGGER(lambda environment, name, status, category, message, first: self.logged(_filled(message, first))),
-            c.cast(memory.calloc, _ALLOCATE),
-            c.cast(memory.free, _FREE),
+            allocate,
+            free,
             _FINISHED(0),
             None,
         )
@@ -71,8 +68,7 @@ class Fmi2(Library):
         function = self.function("Instantiate")
         function.restype = c.c_void_p  # type: ignore[attr-defined]
         kind = 1 if self.plan["kind"] == "CoSimulation" else 0
-        folder = self.plan["resources"]
-        location = Path(folder).as_uri().encode() if folder else None
+        location = self.plan["resources"].encode()
         found = function(b"checked", kind, token.encode(), location, c.byref(self._callbacks), 0, 0)
         self.handle = c.c_void_p(found) if found else None
         return bool(found)

@@ -50,7 +50,7 @@ class Fmi3(Library):
         arguments = [
             b"checked",
             token.encode(),
-            self.plan["resources"].encode() or None,
+            self.plan["resources"].encode(),
             c.c_bool(False),
             c.c_bool(False),
         ]
