@@ -14,8 +14,12 @@ run: $(READY)
 test: lint
 	$(BIN)/python -m pytest -n 2 -m "not long and not faults"
 
+# Also draws fresh cases for the tests that draw any; SEED=N draws those of an earlier run again.
+SEED ?= $(shell od -An -N4 -tu4 /dev/urandom | tr -d ' ')
+test-long: SEED := $(SEED)
 test-long: $(READY)
-	$(BIN)/python -m pytest -n 2 -m "long and not faults"
+	@echo "drawing with the seed $(SEED); the same draws again: make test-long SEED=$(SEED)"
+	$(BIN)/python -m pytest -n 2 -m "(long or hypothesis) and not faults" --hypothesis-profile=fresh --hypothesis-seed=$(SEED)
 
 # Needs valgrind and the sanitizers of gcc or clang.
 faults: $(READY)

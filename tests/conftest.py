@@ -3,8 +3,16 @@ import os
 import time
 
 import pytest
+from hypothesis import HealthCheck, settings
 
 from fmu.export import export_fmu
+
+# Nothing that depends on the speed of the machine may decide about a verdict: no deadline, no check for slowness.
+TIMELESS = {"database": None, "deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
+settings.register_profile("same", derandomize=True, **TIMELESS)
+settings.register_profile("fresh", derandomize=False, print_blob=True, **TIMELESS)
+# `make test` draws the same cases each time; `make test-long` asks for the other profile, with a seed.
+settings.load_profile("same")
 
 
 def fingerprint(automaton):

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 import hybrid_model as hm
+from hybrid_model.consensus.gating import not_negative
 from hybrid_model.consensus.row_clock import row_begin, row_number, row_place
 from hybrid_model.variables import Value
 
@@ -53,7 +54,9 @@ class TableClock(hm.HybridAutomaton):
 class TabulatedWeights(TableClock):
     """Weights that are constant or run straight in each row: piecewise constant and sampled ones."""
 
-    values = hm.Parameter(1.0, shape=("rows", "degree"), unit="1/s", description="weights at the beginning of each row")
+    values = hm.Parameter(
+        1.0, shape=("rows", "degree"), unit="1/s", minimum=0.0, description="weights at the beginning of each row"
+    )
     slopes = hm.Parameter(0.0, shape=("rows", "degree"), unit="1/s2", description="slopes of the weights in each row")
     since = hm.DiscreteState(0.0, unit="s", internal=True, computed=True, description="beginning of the row")
     value = hm.DiscreteState(
@@ -74,7 +77,7 @@ class TabulatedWeights(TableClock):
 
     def outputs(self, s: hm.Values) -> dict[str, Value]:
         """The weights; before the first row those of its beginning."""
-        return {"weights": s.value + s.slope * np.maximum(s.t - s.since, 0.0)}
+        return {"weights": not_negative(s.value + s.slope * np.maximum(s.t - s.since, 0.0))}
 
 
 class SequenceSwitching(TableClock):
@@ -101,7 +104,7 @@ class FunctionWeights(TableClock):
     Parameters
     ----------
     functions : sequence of callable
-        For each edge ``function(t)`` in numpy style, continuous.
+        For each edge ``function(t)`` in numpy style, continuous; what is below 0 counts as 0.
     name : str, optional
         Name of the instance.
     **values
@@ -114,7 +117,7 @@ class FunctionWeights(TableClock):
 
     def outputs(self, s: hm.Values) -> dict[str, Value]:
         """The weights."""
-        return {"weights": np.stack([function(s.t) + 0.0 * s.t for function in self.functions])}
+        return {"weights": np.stack([not_negative(function(s.t) + 0.0 * s.t) for function in self.functions])}
 
 
 def _chosen(row: Value, s: hm.Values) -> Value:

@@ -29,7 +29,7 @@ class ConstantWeights(hm.HybridAutomaton):
     """Weights that do not change."""
 
     degree = hm.Dimension("number of edges")
-    value = hm.Parameter(1.0, shape="degree", unit="1/s", description="weight of each edge")
+    value = hm.Parameter(1.0, shape="degree", unit="1/s", minimum=0.0, description="weight of each edge")
     weights = hm.Output(shape="degree", unit="1/s", description="weights of the edges")
 
     def outputs(self, s: hm.Values) -> dict[str, Value]:
@@ -121,8 +121,8 @@ class GatedAbsoluteSineWeights(GatedSineWeights):
 class SquareWeights(GateClock):
     """Weights that alternate between two levels."""
 
-    high = hm.Parameter(1.0, shape="degree", unit="1/s", description="weight while the gate is on")
-    low = hm.Parameter(0.0, shape="degree", unit="1/s", description="weight while the gate is off")
+    high = hm.Parameter(1.0, shape="degree", unit="1/s", minimum=0.0, description="weight while the gate is on")
+    low = hm.Parameter(0.0, shape="degree", unit="1/s", minimum=0.0, description="weight while the gate is off")
 
     def outputs(self, s: hm.Values) -> dict[str, Value]:
         """The weights."""
@@ -134,8 +134,10 @@ class SineWeights(hm.HybridAutomaton):
     """Weights ``mean (1 + depth sin(rate t - phase))``, smooth at all times."""
 
     degree = hm.Dimension("number of edges")
-    mean = hm.Parameter(1.0, shape="degree", unit="1/s", description="mean weight")
-    depth = hm.Parameter(0.5, shape="degree", description="share of the mean by which the weight swings, 0 to 1")
+    mean = hm.Parameter(1.0, shape="degree", unit="1/s", minimum=0.0, description="mean weight")
+    depth = hm.Parameter(
+        0.5, shape="degree", minimum=0.0, maximum=1.0, description="share of the mean by which the weight swings"
+    )
     rate = hm.Parameter(1.0, shape="degree", unit="rad/s", description="rate of the sine")
     phase = hm.Parameter(0.0, shape="degree", unit="rad", description="phase of the sine")
     weights = hm.Output(shape="degree", unit="1/s", description="weights of the edges")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybrid_model.consensus.gating import not_negative
 from hybrid_model.variables import Value
 
 ROUNDS = 8
@@ -33,7 +34,7 @@ class Wave:
 
     def value(self, t: Value) -> Value:
         """Weights at time `t` in s."""
-        return self.mean + self.cosine * np.cos(self.rate * t) + self.sine * np.sin(self.rate * t)
+        return not_negative(self.mean + self.cosine * np.cos(self.rate * t) + self.sine * np.sin(self.rate * t))
 
     def integral(self, a: Value, b: Value) -> Value:
         """Integrals from `a` to `b` in s, in a form that does not cancel for short intervals."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
+from hybrid_model.consensus.gating import not_negative
 from hybrid_model.consensus.graphs import Edge
 from hybrid_model.consensus.primitive import Primitive
 from hybrid_model.consensus.row_clock import RowClock, check_rows
@@ -20,6 +21,8 @@ TimeFunction = Callable[[Any], Any]
 """A function of time [s] in numpy style: the same line serves floats, arrays and symbols."""
 
 _CHECKS, _SAMPLES = 257, 2049
+_ROUNDING = 1e-12
+"""Share of the largest value by which rounding may leave a weight below 0."""
 _TRIED = 100.0
 """Time [s] over which a function without a period is tried out."""
 
@@ -54,7 +57,11 @@ class FunctionCarrier:
         return self.clock.breakpoints(t0, t1) if self.clock is not None else np.empty(0)
 
     def value(self, t: ArrayLike) -> NDArray[np.float64]:
-        """Value at time `t` [s]."""
+        """Value at time `t` [s]; what is below 0 counts as 0."""
+        return np.asarray(not_negative(self.raw(t)))
+
+    def raw(self, t: ArrayLike) -> NDArray[np.float64]:
+        """What the function gives at time `t` [s], below 0 or not."""
         time = np.asarray(t, dtype=float)
         return np.broadcast_to(np.asarray(self.function(time), dtype=float), time.shape)
 
@@ -72,8 +79,8 @@ class FunctionWeight:
     ----------
     function : callable
         ``function(t)`` in numpy style (``np.where``, ``np.exp``, ... instead of ``if`` and ``math``), so that it runs
-        on arrays and is traced into exported FMUs. It must be at least 0 and continuous; a weight that also jumps is
-        this one under a switching, or a table.
+        on arrays and is traced into exported FMUs. It must be at least 0, up to rounding, and continuous; a weight that
+        also jumps is this one under a switching, or a table. What is below 0 counts as 0, in all executions.
     kinks : tuple of float
         Times [s] of the points where it is not smooth, ascending; those of one period if it has a period. Runs stop
         there and go on.
@@ -83,8 +90,8 @@ class FunctionWeight:
     Raises
     ------
     ValueError
-        If the function is negative, not finite or not periodic at one of the times at which this is tried out, or the
-        kinks do not ascend within one period.
+        If the function is negative by more than rounding, not finite or not periodic at one of the times at which this
+        is tried out, or the kinks do not ascend within one period.
     """
 
     function: TimeFunction
@@ -99,11 +106,12 @@ class FunctionWeight:
             check_rows(self.kinks, self.period, ("kinks", "period"))
         span = self.period if self.period is not None else _TRIED
         times = np.linspace(0.0, span, _CHECKS)
-        values = self.carrier.value(times)
+        values = self.carrier.raw(times)
+        rounding = _ROUNDING * float(np.max(np.abs(values)))
         for time, value in zip(times.tolist(), values.tolist(), strict=True):
-            require(f"the weight at t = {time:.6g}", value, value >= 0, "must not be negative")
+            require(f"the weight at t = {time:.6g}", value, value >= -rounding, "must not be negative")
         if self.period is not None:
-            later = self.carrier.value(times + self.period)
+            later = self.carrier.raw(times + self.period)
             wrong = np.abs(later - values) > 1e-9 * (1 + values.max())
             if wrong.any():
                 time = float(times[wrong.argmax()])

@@ -23,6 +23,7 @@ __all__ = [
     "gated_sine",
     "half_wave",
     "half_wave_boundary",
+    "not_negative",
 ]
 
 Expression = Any
@@ -109,3 +110,11 @@ def gated_sine(t: Expression, k: Expression, sine_rate: Expression) -> Expressio
     """
     is_off = k - 2 * np.floor(k / 2)
     return 2 * (1 - is_off) * np.sin(sine_rate * t)
+
+
+def not_negative(weight: Expression) -> Expression:
+    """The weight itself, or 0 where rounding has left it below.
+
+    A choice and no maximum: where the weight is 0, its derivative stays that of the weight.
+    """
+    return np.where(weight < 0, 0.0, weight)

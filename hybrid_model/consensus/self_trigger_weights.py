@@ -16,7 +16,7 @@ from hybrid_model.variables import Value
 class ConstantSelfTrigger(SelfTrigger):
     """Self-triggered broadcasting over edges of constant weight, switched on and off by the table of active graphs."""
 
-    level = hm.Parameter(1.0, shape="degree", unit="1/s", description="weight of each edge")
+    level = hm.Parameter(1.0, shape="degree", unit="1/s", minimum=0.0, description="weight of each edge")
 
     def wave(self, s: hm.Values, pieces: Mapping[str, Value]) -> Wave:
         """A constant."""
@@ -26,8 +26,10 @@ class ConstantSelfTrigger(SelfTrigger):
 class SineSelfTrigger(SelfTrigger):
     """Self-triggered broadcasting over edges with the weights ``mean (1 + depth sin(rate t - phase))``."""
 
-    mean = hm.Parameter(1.0, shape="degree", unit="1/s", description="mean weight of each edge")
-    depth = hm.Parameter(0.5, shape="degree", description="share of the mean by which the weight swings")
+    mean = hm.Parameter(1.0, shape="degree", unit="1/s", minimum=0.0, description="mean weight of each edge")
+    depth = hm.Parameter(
+        0.5, shape="degree", minimum=0.0, maximum=1.0, description="share of the mean by which the weight swings"
+    )
     rate = hm.Parameter(1.0, shape="degree", unit="rad/s", description="rate of the sine")
     phase = hm.Parameter(0.0, shape="degree", unit="rad", description="phase of the sine")
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.carriers import UnitCarrier
+from hybrid_model.consensus.gating import not_negative
 from hybrid_model.consensus.row_clock import RowClock, check_rows
 from hybrid_model.consensus.waveform import ALWAYS, require
 
@@ -129,7 +130,7 @@ class LinearCarrier:
         number = self.clock.number(time)
         place = number % self.clock.rows
         within = np.maximum(time - self.clock.begin(number), 0.0)
-        return np.asarray(self.levels[place] + self.slopes[place] * within)
+        return np.asarray(not_negative(self.levels[place] + self.slopes[place] * within))
 
     def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
         """Exact integral from `t0` to `t1` [s]."""

@@ -7,11 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from own_importer import Exchange, Importer
 from scipy.integrate import quad
 
+import hybrid_model as hm
+from fmu.compiled import compiled
 from hybrid_model.consensus.carriers import UnitCarrier
+from hybrid_model.consensus.edge_blocks import weights_block
 from hybrid_model.consensus.edge_weights import EdgeWeights
+from hybrid_model.consensus.forecast import Wave
 from hybrid_model.consensus.function_weights import FunctionWeight, distance_weights, reliability_weight
+from hybrid_model.consensus.gating import half_wave_boundary
 from hybrid_model.consensus.row_clock import RowClock, row_begin, row_number
 from hybrid_model.consensus.switching import NoSwitching, SwitchingSequence
 from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
@@ -133,6 +139,76 @@ class TestEveryKind:
         np.testing.assert_array_equal(wave.value(begins), [float(wave.value(t)) for t in begins])
 
 
+def samples_that_end_at_zero(top, end):
+    """A saw tooth: its last row falls to 0, where rounding leaves what is computed from its beginning below."""
+    return SampledWeight((0.0, 0.3, end), (top / 3, top, 0.0), repeat=True)
+
+
+def touching_zero(t):
+    """The positive part of a sine, and a sum that is 0 up to rounding."""
+    return np.maximum(np.sin(t), 0.0) + (1.0 - np.cos(t) ** 2 - np.sin(t) ** 2)
+
+
+class TestNeverNegative:
+    """Weights touch zero, and rounding decides on which side of it: just before, at and just after each breakpoint."""
+
+    @given(top=st.floats(0.1, 5.0), end=st.floats(0.4, 3.0), zeros=st.integers(0, 3), k=st.integers(-2000, 2000))
+    @settings(max_examples=300)
+    def test_samples_at_the_ends_of_rows(self, top, end, zeros, k):
+        pad = tuple(0.3 * n / (zeros + 1) for n in range(1, zeros + 1))
+        wave = SampledWeight((0.0, *pad, 0.3, end), (0.0, *(0.0 for _ in pad), top, 0.0), repeat=True)
+        clock = wave.carrier.clock
+        begins = clock.begin(np.arange(k * clock.rows, (k + 1) * clock.rows))
+        times = np.concatenate([np.nextafter(begins, -np.inf), begins, np.nextafter(begins, np.inf)])
+        assert wave.value(times).min() >= 0
+
+    def test_samples_just_below_a_multiple_of_the_period(self):
+        wave = SampledWeight((0.0, 1, 2, 3, 4, 5, 5.40625), (0.0, 0, 0, 0, 2.625, 1.125, 0), repeat=True)
+        assert float(wave.value(-7.6e-105)) == 0.0
+
+    def test_a_function_that_rounding_leaves_below_zero(self):
+        wave = FunctionWeight(touching_zero, period=2 * math.pi)
+        times = np.linspace(0.0, 6.0, 500)
+        assert wave.carrier.raw(times).min() < 0
+        assert wave.value(times).min() == 0
+
+    @pytest.mark.parametrize("end", [0.7, 0.9, 1.1])
+    def test_in_runs(self, end):
+        block = weights_block([samples_that_end_at_zero(1.3, end)])
+        for arc in (hm.simulate(block, 20.0), hm.simulate(compiled(block), 20.0)):
+            assert arc["weights"].min() == 0.0
+
+    def test_a_function_in_runs(self):
+        block = weights_block([FunctionWeight(touching_zero)])
+        for arc in (hm.simulate(block, 20.0), hm.simulate(compiled(block), 20.0)):
+            assert arc["weights"].min() == 0.0
+
+    @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+    def test_in_fmus(self, exported, fmi):
+        # An importer reads the output where a row ends and before it says so: the row still holds.
+        path = exported(weights_block([samples_that_end_at_zero(1.3, 0.7)]), key="falling_samples", fmi=fmi)
+        found = []
+        with Importer(path, "me") as importer:
+            importer.initialize(20.0)
+            exchange = Exchange(importer, 20.0, (), {}, ())
+            exchange.iterate()
+            while exchange.next_event < 20.0:
+                importer.fmu.enterContinuousTimeMode()
+                importer.fmu.setTime(exchange.next_event)
+                found.append(importer.get("weights[1]"))
+                importer.fmu.enterEventMode()
+                exchange.iterate()
+        assert len(found) == 57  # 28 whole periods, and one row more
+        assert min(found) == 0.0
+
+    @given(rate=rates, h=st.integers(0, 3000))
+    def test_the_forecast_of_a_half_wave_at_its_end(self, rate, h):
+        # 2|sin| on one half wave is sign*2*sin, which rounding lets cross zero at the wave's end.
+        sign, zero = 1.0 - 2.0 * (h % 2), 0.0 * rate
+        wave = Wave(zero, zero, 2.0 * sign, rate)
+        assert wave.value(half_wave_boundary(float(h), rate)) >= 0
+
+
 class TestByHand:
     def test_sine(self):
         wave = SineWeight(2.0, 0.5, 3.0, 0.7)
@@ -213,6 +289,7 @@ class TestByHand:
         (lambda: PiecewiseWeight((0.0,), (-1.0,)), r"values\[1\] is -1.0; it must not be negative"),
         (lambda: SampledWeight((0.0,), (1.0,)), "times lists 1 samples; there must be at least 2"),
         (lambda: SampledWeight((0.0, math.nan), (1.0, 1.0)), r"times\[2\] is nan; it must be a finite number"),
+        (lambda: FunctionWeight(lambda t: np.sin(t) ** 2 - 1e-9), "the weight at t = 0 is -1e-09; it must not be neg"),
         (lambda: FunctionWeight(lambda t: np.cos(t)), "the weight at t = .* must not be negative"),
         (
             lambda: FunctionWeight(lambda t: t, period=1.0),

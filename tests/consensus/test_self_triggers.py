@@ -154,12 +154,9 @@ def test_the_forecast_finds_the_first_meeting(seed):
     """Against a fine table and bracketing; a search that is still open is taken up again from where it got to."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, 4))
-    wave = Wave(
-        mean=rng.uniform(0.5, 2.0, count),
-        cosine=rng.uniform(-1.0, 1.0, count),
-        sine=rng.uniform(-1.0, 1.0, count),
-        rate=rng.uniform(0.5, 8.0, count),
-    )
+    mean, angle = rng.uniform(0.5, 2.0, count), rng.uniform(0.0, 2.0 * np.pi, count)
+    swing = mean * rng.uniform(0.0, 1.0, count)  # weights are not negative
+    wave = Wave(mean, swing * np.cos(angle), swing * np.sin(angle), rate=rng.uniform(0.5, 8.0, count))
     pull, decay, threshold = rng.uniform(-1.0, 1.0, count), rng.uniform(0.0, 1.0), 0.5
     since, end = 1.3, 1.3 + rng.uniform(0.5, 5.0)
     error = rng.uniform(-0.9, 0.9) * threshold * np.exp(-decay * since)

@@ -120,7 +120,7 @@ def wave_crossings(omega, phase, level, t_end):
     return [(t, name) for t, name in events if 0.0 < t < t_end]
 
 
-@settings(max_examples=20, deadline=None, derandomize=True, database=None)
+@settings(max_examples=20, deadline=None)
 @given(st.integers(4, 250), st.integers(0, 62), st.integers(-9, 9))
 def test_every_crossing_of_a_wave_in_one_step_is_found(omega, phase, level):
     # Up to 20 crossings in steps that grow to the whole run: nothing in the state tells the solver of them.
@@ -146,7 +146,7 @@ class Turning(Wave):
         return s.x - s.level
 
 
-@settings(max_examples=15, deadline=None, derandomize=True, database=None)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(0, 62), st.integers(-8, 8), st.sampled_from([1e-3, 1e-5, 1e-7]))
 def test_every_crossing_of_a_rotation_in_coarse_steps_is_found(phase, level, rtol):
     omega, phase, level, t_end = 3.0, phase / 10 + 0.003, level / 10 + 0.001, 10.0
