@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from hybrid_model.consensus.bounds import Bounds
 from hybrid_model.consensus.hypotheses import PAPER_LAWS
 from hybrid_model.consensus.observed import Observation
+from hybrid_model.consensus.verdicts import statement
 
 __all__ = ["FORMS", "Certified", "certified_values"]
 
@@ -64,7 +65,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
     rates = entries(
         "rate",
         "1/s",
-        ("printed", bounds.printed.rate or None, "paper, theorem 1 (false as printed: audit, section 3)", (tree,)),
+        ("printed", bounds.printed.rate or None, _printed("theorem 1", "b"), (tree,)),
         ("valid", bounds.valid.rate or None, "audit, section 3 (i)", (union, excited)),
         ("improved", improved or None, "audit, section 3 (ii)", (union, excited)),
         ("floquet", bounds.floquet_rate, "audit, section 7", (union, periodic)),
@@ -72,7 +73,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
     transients = entries(
         "transient",
         "1",
-        ("printed", None, "paper, eq:stm inequality, leaves m_v open", ()),
+        ("printed", None, _printed("eq:stm inequality", "b'"), ()),
         ("valid", bounds.valid.overshoot if bounds.valid.rate else None, "audit, section 3, m_v", (union, excited)),
         (
             "improved",
@@ -88,7 +89,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
         (
             "printed",
             bounds.printed_radius if _is_papers(bounds) else None,
-            "paper, theorem 2, rho kappa_2",
+            _printed("theorem 2, rho kappa_2", "l"),
             (tree, paper, "ideal channel", "beta below the printed rate"),
         ),
         ("valid", bounds.valid_radius, "audit, section 5.2", (union, errors, "beta below the valid rate")),
@@ -113,7 +114,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
         (
             "printed",
             bounds.printed_gap if _is_papers(bounds) else None,
-            "paper, eq:zeno dynamic upper bound",
+            _printed("eq:zeno dynamic upper bound", "e3"),
             (tree, paper, "ideal channel", "beta below the printed rate"),
         ),
         ("valid", bounds.valid_gap, "audit, section 6, Lambert form", (union, errors, "beta below the valid rate")),
@@ -126,6 +127,11 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
         ("observed", None if seen is None else seen.min_gap, "run", ()),
     )
     return (*rates, *transients, *radii, *gaps)
+
+
+def _printed(place: str, row: str) -> str:
+    """Where the paper states something, and what was shown of it."""
+    return f"paper, {place} ({statement(row).remark})"
 
 
 def _is_papers(bounds: Bounds) -> bool:

@@ -17,6 +17,7 @@ from hybrid_model.consensus.report import edge_norm
 from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.trees import tree_radii
 from hybrid_model.consensus.trigger_data import TriggerKind
+from hybrid_model.consensus.verdicts import statement
 
 __all__ = ["scenario_notes"]
 
@@ -185,12 +186,12 @@ def _radius_notes(bounds: Bounds) -> Iterator[str]:
 
 
 def _refuted(bounds: Bounds, seen: Observation | None) -> Iterator[str]:
-    """Printed numbers that this very scenario contradicts, and those that are wrong in general."""
+    """Printed numbers that this very scenario contradicts, and those whose proof or statement fails in general."""
     printed, valid = bounds.printed, bounds.valid
     if printed.rate > valid.rate * (1 + 1e-9) > 0:
         yield (
             f"The printed rate {printed.rate:.6g}/s uses mu2 of W_tau where the proof needs mu2 of M; with that it is "
-            f"{valid.rate:.6g}/s (audit, section 3)."
+            f"{valid.rate:.6g}/s ({statement('b').remark})."
         )
     if bounds.floquet_rate is not None and printed.rate > bounds.floquet_rate * (1 + 1e-9):
         yield f"The printed rate {printed.rate:.6g}/s is false here: the Floquet rate is {bounds.floquet_rate:.6g}/s."
@@ -204,10 +205,14 @@ def _refuted(bounds: Bounds, seen: Observation | None) -> Iterator[str]:
         yield (
             f"The printed minimum gap {gap:.6g} s is not one: kappa_1 = {printed.kappa1:.6g} is negative, so its "
             f"formula is not the least value of its own inequality, which tends to {limit:.6g} s; "
-            "hybrid_model.consensus.counterexamples.minimum_gap() shows a run that violates the formula."
+            "hybrid_model.consensus.counterexamples.minimum_gap() shows a run that violates the formula "
+            f"({statement('e3').remark})."
         )
         if seen is not None and seen.min_gap is not None and gap > seen.min_gap:
             yield f"This run violates the printed minimum gap: two broadcasts are {seen.min_gap:.6g} s apart."
     exact = bounds.exact_radius
     if bounds.printed_radius is not None and exact is not None and bounds.printed_radius < exact * (1 - 1e-6):
-        yield f"The printed radius {bounds.printed_radius:.6g} is false here: errors exist that reach {exact:.6g}."
+        yield (
+            f"The printed radius {bounds.printed_radius:.6g} does not hold for all errors within the threshold, some "
+            f"reach {exact:.6g}; whether those of a run do is another question."
+        )

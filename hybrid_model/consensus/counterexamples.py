@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 import hybrid_model as hm
 from hybrid_model.consensus.certificates import BoundForm, convergence_bound, rate_of_contraction
+from hybrid_model.consensus.excitation import Signal, signal_factor
 from hybrid_model.consensus.floquet import floquet_spectrum
 from hybrid_model.consensus.gaps import frozen_gap, printed_gap
 from hybrid_model.consensus.graphs import incidence, weighted_laplacian
 from hybrid_model.consensus.network import agent_name, closed_loop
 from hybrid_model.consensus.report import run_report
+from hybrid_model.consensus.scenario import load_scenario
 from hybrid_model.consensus.scenario_data import Network, Scenario, Weights
 from hybrid_model.consensus.spanning_trees import TreePartition
 from hybrid_model.consensus.switching import NoSwitching
 from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
-from hybrid_model.consensus.weights import ConstantWeight
+from hybrid_model.consensus.weights import ConstantWeight, GatedSine, WeightMap
 
 __all__ = [
     "Counterexample",
     "certifiable_rate",
     "corrected_gap_without_kappa1",
+    "decay_of_the_example",
     "derivative_at_own_event",
+    "derivative_on_a_path",
     "integrated_norm",
     "literal_excitation",
     "minimum_gap",
@@ -33,6 +37,7 @@ __all__ = [
     "partial_window",
     "printed_sum",
     "shrinking_gaps",
+    "signed_weights",
     "valid_sum",
     "vanishing_weights",
 ]
@@ -95,6 +100,28 @@ def literal_excitation(weight: float = 10.0, window: float = 0.005) -> Counterex
         floquet_spectrum(scenario).rate,
         is_lower=True,
         unit="1/s",
+    )
+
+
+def signed_weights() -> Counterexample:
+    """The example with the weights w = g, which are negative half of the time: largest multiplier over one cycle.
+
+    The absolute weights with the sign of the sine; on each half wave the flow is that of a constant Laplacian.
+    """
+    scenario = load_scenario("paper-a")
+    waveforms = tuple(replace(w, map=WeightMap.ABS) for w in scenario.weights.waveforms if isinstance(w, GatedSine))
+    scenario = replace(scenario, weights=replace(scenario.weights, waveforms=waveforms))
+    factor, flow = signal_factor(scenario, Signal.DISAGREEMENT), np.eye(scenario.network.agents - 1)
+    for piece in scenario.edge_weights.pieces(0.0, 2 * math.pi):
+        carrier = piece.shared_carrier
+        if carrier is not None:
+            sign = np.sign(np.sin(waveforms[0].sine_rate * (piece.start + piece.end) / 2))
+            values, vectors = np.linalg.eigh((factor * piece.amplitudes) @ factor.T)
+            flow = (vectors * np.exp(-sign * carrier.integral(piece.start, piece.end) * values)) @ vectors.T @ flow
+    return Counterexample(
+        "Simulation section: consensus with the weights w = g, so no multiplier above 1",
+        1.0,
+        float(np.max(np.abs(np.linalg.eigvals(flow)))),
     )
 
 
@@ -192,6 +219,17 @@ def derivative_at_own_event(scenario: Scenario, arc: hm.HybridArc, samples: int 
     return Counterexample("Proof of theorem 2, Zeno part: x' is k D W D^T x(t1) up to the next event", 1.0, worst)
 
 
+def derivative_on_a_path() -> Counterexample:
+    """`derivative_at_own_event` where it can be done by hand: three agents on a path, x(0) = (0, 0.4, 1), c = 0.5.
+
+    Agent 1 broadcasts at 1.25 s, with edge states (7, 2)/120 in size; agent 2 broadcasts 0.9 at 3.54 s, and from then
+    on agent 1 moves with 0.4: 48/sqrt(159) times the stated bound.
+    """
+    trigger = Trigger(TriggerKind.STATIC, 0.5)
+    scenario = _constant_network(((1, 2), (2, 3)), (0.0, 0.4, 1.0), 1.0, trigger, 6.0)
+    return derivative_at_own_event(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time), 100)
+
+
 def _edge_norms(
     D: NDArray[np.float64], arc: hm.HybridArc, names: list[str], times: NDArray[np.float64]
 ) -> NDArray[np.float64]:
@@ -228,7 +266,7 @@ def vanishing_weights(terms: int = 60) -> Counterexample:
     return Counterexample("Corollary 1: contiguous intervals with connected unions suffice", 0.0, math.exp(-2 * total))
 
 
-def no_common_tree(window: float) -> Counterexample:
+def no_common_tree(window: float = 100.0) -> Counterexample:
     """The proof of corollary 1: no spanning tree excites every window of one length.
 
     Three agents; intervals of 1 s with the tree {12, 23} or {13, 23}, in runs of 1, 1, 2, 2, 4, 4, ... intervals. Every
@@ -268,3 +306,18 @@ def certifiable_rate(agents: int, edges: tuple[tuple[int, int], ...], window: fl
     spectrum = TreePartition(agents, edges).Lambda
     gamma = float(spectrum[0]) / (2 * math.sqrt(agents - 1) * float(spectrum[-1]))
     return rate_of_contraction(gamma, window)
+
+
+def decay_of_the_example() -> Counterexample:
+    """The largest alpha_v that any reading of the example can certify, against beta = 0.06 of its dynamic trigger.
+
+    All gates are closed for 0.4 pi s, so a window has to be longer; the trees are the star and the path on four agents.
+    """
+    trees = (((1, 2), (1, 3), (1, 4)), ((1, 2), (2, 3), (3, 4)))
+    return Counterexample(
+        "Simulation section: alpha_v is above beta = 0.06 by choice",
+        load_scenario("paper-a-dynamic").trigger.decay,
+        max(certifiable_rate(4, tree, 0.4 * math.pi) for tree in trees),
+        is_lower=True,
+        unit="1/s",
+    )

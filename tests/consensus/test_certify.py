@@ -25,6 +25,7 @@ from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.reachable_sets import ReachableSets
 from hybrid_model.consensus.scenario import load_scenario, read_scenario
 from hybrid_model.consensus.trees import tree_radii
+from hybrid_model.consensus.verdicts import Verdict, statement
 from hybrid_model.consensus.worst_case import worst_case
 
 
@@ -137,6 +138,15 @@ class TestPublishedNumbersOfScenarioA:
         notes = " ".join(paper["paper-a-static"].notes)
         assert "The printed minimum gap 0.000593288 s is not one" in notes
         assert "tends to 2.03163e-06 s" in notes
+
+    def test_what_is_said_of_the_paper_is_the_verdict(self, paper):
+        rows = {"rate": "b", "transient": "b'", "radius": "l", "min_gap": "e3"}
+        for found in paper.values():
+            printed = {value.quantity: value.source for value in found.values if value.form == "printed"}
+            assert set(printed) == set(rows)
+            for quantity, row in rows.items():
+                assert printed[quantity].endswith(f"({statement(row).remark})")
+                assert ("false" in printed[quantity]) == (statement(row).verdict is Verdict.FALSE)
 
     def test_json_has_the_documented_keys(self, paper):
         found = json.loads(json.dumps(paper["paper-a"].as_dict()))

@@ -16,6 +16,7 @@ from hybrid_model.consensus.counterexamples import (
     certifiable_rate,
     corrected_gap_without_kappa1,
     derivative_at_own_event,
+    derivative_on_a_path,
     integrated_norm,
     literal_excitation,
     minimum_gap,
@@ -325,6 +326,10 @@ class TestRowsEZeno:
         found = derivative_at_own_event(scenario, arc)
         assert found.refutes
         assert found.actual == pytest.approx(1.744, abs=2e-3)  # the maximum over 4000 times, published with 4 digits
+
+    def test_the_derivative_on_a_path_by_hand(self):
+        # |x_1'| = 0.4 against sqrt(3) sqrt(7^2 + 2^2)/120.
+        assert derivative_on_a_path().actual == pytest.approx(48 / math.sqrt(159), rel=1e-9)
 
     def test_minimum_gap(self):
         found = minimum_gap()
