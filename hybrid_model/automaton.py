@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import numbers
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from types import FunctionType
 from typing import Any, ClassVar
 
 import numpy as np
 
+from hybrid_model.class_body import UNBOUND, require_sound_body
 from hybrid_model.errors import DeclarationError
+from hybrid_model.real_numbers import FLOATS, real_array, told
 from hybrid_model.transitions import (
     Assignments,
     Clock,
@@ -22,8 +26,8 @@ from hybrid_model.transitions import (
 from hybrid_model.variables import Declaration, Dimension, Kind, Value, Values, Variable
 from hybrid_model.vector_form import VectorForm
 
-RESERVED = ("t", "jump_set", "jump_map")
-"""Names with a meaning that no attribute of `HybridAutomaton` holds."""
+NO_SYMBOLS = (str, bytes, numbers.Complex, tuple, list, dict, set, type(None), FunctionType, np.ndarray, np.generic)
+"""What a map may return in the place of a number by mistake; anything else can be an expression of a trace."""
 
 
 class Automaton(ABC):
@@ -119,9 +123,14 @@ class HybridAutomaton(Automaton):
 
     priority = Priority.JUMP
     transitions: ClassVar[tuple[Jump | TimeEvent, ...]] = ()
+    written_by_authors: ClassVar[frozenset[str]] = frozenset(
+        {"flow_map", "flow_set", "start_map", "outputs", "transitions", "priority", "vector_form"}
+    )
+    listed: ClassVar[Mapping[str, tuple[type, ...]]] = {"transitions": (Jump, TimeEvent)}
 
     def __init__(self, name: str | None = None, **values: Any) -> None:
-        self.name = name or type(self).__name__
+        require_sound_body(type(self), self.listed)
+        self.name = _instance_name(type(self), name)
         declarations = _declared(type(self), Declaration)
         dimensions = _declared(type(self), Dimension)
         for given in values:
@@ -173,6 +182,22 @@ class HybridAutomaton(Automaton):
         """Whether ``flow_set`` is overridden."""
         return type(self).flow_set is not HybridAutomaton.flow_set
 
+    def __setattr__(self, name: str, value: object) -> None:
+        if name in self.written_by_authors or name in UNBOUND:
+            raise DeclarationError(
+                f"{type(self).__name__}: {name} is read from the class, so it cannot be set on an instance: write it "
+                "in the class, or in a subclass."
+            )
+        super().__setattr__(name, value)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Functions without a name, as transitions and modes have them, cannot be pickled; they are those of the class.
+        return {key: value for key, value in vars(self).items() if key != "_transitions"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._transitions = self._collect_transitions()
+
     def start_values(self, s: Values) -> Assignments:
         """See `Automaton.start_values`."""
         computed = [v.name for v in self.variables if v.computed]
@@ -181,7 +206,12 @@ class HybridAutomaton(Automaton):
     def derivatives(self, s: Values) -> Assignments:
         """See `Automaton.derivatives`."""
         states = [v.name for v in self.variables if v.kind is Kind.STATE]
-        return self._checked("flow_map", self.flow_map(s), states, states)
+        try:
+            rates = self.flow_map(s)
+        except ValueError as error:
+            self._explain_unwritable("flow_map", error)
+            raise
+        return self._checked("flow_map", rates, states, states)
 
     def flow_margin(self, s: Values) -> Value:
         """See `Automaton.flow_margin`."""
@@ -197,13 +227,23 @@ class HybridAutomaton(Automaton):
 
     def event_times(self, s: Values) -> list[Value]:
         """See `Automaton.event_times`."""
-        return [t.time(self, s) for t in self._transitions if isinstance(t, TimeEvent)]
+        return [
+            self._scalar(f"the time of {t.name!r}", "a time in s, or np.inf for never", t.time(self, s))
+            for t in self._transitions
+            if isinstance(t, TimeEvent)
+        ]
 
     def reset(self, jump: int, s: Values) -> Assignments:
         """See `Automaton.reset`."""
         transition = self._transitions[jump]
         states = [v.name for v in self.variables if v.kind in (Kind.STATE, Kind.DISCRETE)]
-        return self._checked(f"the jump map of {transition.name!r}", transition.jump_map(self, s), states, [])
+        what = f"the jump map of {transition.name!r}"
+        try:
+            new = transition.jump_map(self, s)
+        except ValueError as error:
+            self._explain_unwritable(what, error)
+            raise
+        return self._checked(what, new, states, [])
 
     def output_values(self, s: Values) -> Assignments:
         """See `Automaton.output_values`."""
@@ -235,6 +275,13 @@ class HybridAutomaton(Automaton):
             clocks.append(ClockInfo(key, names.index(clock.jump), clock.description))
         return tuple(clocks)
 
+    def _explain_unwritable(self, what: str, error: ValueError) -> None:
+        if "read-only" in str(error):
+            raise DeclarationError(
+                f"{what} of {self.name} writes into a value that it was given: work on a copy, s.x.copy(), and return "
+                "that."
+            ) from error
+
     def _checked(self, what: str, values: Assignments, allowed: Sequence[str], required: Sequence[str]) -> Assignments:
         # One comparison in the good case: this runs in the inner loop of every execution.
         if not isinstance(values, Mapping):
@@ -248,6 +295,8 @@ class HybridAutomaton(Automaton):
         return values
 
     def _margin(self, what: str, margin: Value) -> Value:
+        if type(margin) in FLOATS:
+            return margin
         if _is_indicator(margin):
             raise DeclarationError(
                 f"{what} of {self.name} is {_kind_of(margin)}: return a margin instead, a number that is zero or above "
@@ -260,7 +309,19 @@ class HybridAutomaton(Automaton):
                 f"{what} of {self.name} has shape {margin.shape}, but a margin is a scalar: join the elements with "
                 "np.min for 'all of them', np.max for 'any of them'."
             )
-        return margin
+        return self._scalar(what, "a margin, one number that is zero or above inside the set", margin)
+
+    def _scalar(self, what: str, wanted: str, value: Value) -> Value:
+        traced = not isinstance(value, NO_SYMBOLS) or (isinstance(value, np.ndarray) and value.dtype.kind == "O")
+        if type(value) in FLOATS or traced:
+            return value
+        try:
+            number = real_array(value)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise DeclarationError(f"{what} of {self.name} is {told(value)}: return {wanted}.") from error
+        if number.shape:
+            raise DeclarationError(f"{what} of {self.name} has shape {number.shape}: return {wanted}.")
+        return float(number)
 
 
 def require_automaton(given: Automaton) -> None:
@@ -275,6 +336,15 @@ def require_automaton(given: Automaton) -> None:
         raise DeclarationError(f"{given.__name__} is a class: make an instance of it, {given.__name__}().")
     if not isinstance(given, Automaton):
         raise DeclarationError(f"{given!r} is not an automaton: give a HybridAutomaton or a Composition.")
+
+
+def _instance_name(cls: type, given: object) -> str:
+    if given is not None and not isinstance(given, str):
+        raise DeclarationError(
+            f"{cls.__name__} was given {told(given)} as the name of the instance: give values by name, "
+            f"{cls.__name__}(variable={told(given)})."
+        )
+    return given or cls.__name__
 
 
 def _is_indicator(margin: Value) -> bool:
@@ -294,8 +364,6 @@ def _declared(cls: type, kind: type) -> dict[str, Any]:
     for base in reversed(cls.__mro__):
         for key, value in vars(base).items():
             if isinstance(value, kind):
-                if key in RESERVED or hasattr(HybridAutomaton, key) or key in Automaton.__annotations__:
-                    raise DeclarationError(f"{cls.__name__} declares {key!r}, a name of the framework: choose another.")
                 found[key] = value
     return found
 

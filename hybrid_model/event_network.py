@@ -161,7 +161,7 @@ def _start(run: Execution, values: Values, given: Mapping[str, InputValue]) -> N
     layout = run.layout
     for variable in run.automaton.of_kind(Kind.INPUT):
         if variable.name not in given:
-            run.inputs.hold(variable.name, np.asarray(values[variable.name], dtype=np.float64))
+            run.inputs.hold(variable.name, values[variable.name])
     run.x, run.z = (
         layout.pack(kind, {place.variable.name: values[place.variable.name] for place in layout.places[kind]})
         for kind in (Kind.STATE, Kind.DISCRETE)

@@ -110,13 +110,22 @@ def _move(execution: Execution, piece: FlowPiece) -> FlowPiece:
 
 def straight_piece(t0: float, t1: float, x0: FloatArray, x1: FloatArray) -> FlowPiece:
     """Return the piece of a flow that is a straight line from x0 at t0 to x1 at t1."""
-    span = t1 - t0 or 1.0
+    return FlowPiece(t0, t1, x0, x1, _Line(t0, t1, x0, x1))
 
-    def interpolate(t: float | FloatArray) -> FloatArray:
-        part = (np.asarray(t) - t0) / span
-        return x0 + (x1 - x0) * part if part.ndim == 0 else x0[:, None] + (x1 - x0)[:, None] * part
 
-    return FlowPiece(t0, t1, x0, x1, interpolate)
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """The dense output of a straight piece; a class, since a function made for each piece could not be pickled."""
+
+    t0: float
+    t1: float
+    x0: FloatArray
+    x1: FloatArray
+
+    def __call__(self, t: float | FloatArray) -> FloatArray:
+        part = (np.asarray(t) - self.t0) / (self.t1 - self.t0 or 1.0)
+        change = self.x1 - self.x0
+        return self.x0 + change * part if part.ndim == 0 else self.x0[:, None] + change[:, None] * part
 
 
 class _FlowMap:

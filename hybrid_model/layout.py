@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybrid_model.errors import DeclarationError
+from hybrid_model.real_numbers import FLOATS, real_array, told
 from hybrid_model.transitions import Assignments
 from hybrid_model.variables import FloatArray, Kind, Value, Values, Variable, element_names
 
@@ -28,7 +29,10 @@ class Place:
         if not self.variable.shape:
             return vector[self.at.start]
         part = vector[self.at]
-        return part if len(self.variable.shape) == 1 else part.reshape(self.variable.shape)
+        part = part if len(self.variable.shape) == 1 else part.reshape(self.variable.shape)
+        # A map that writes into it would write into the state of the run.
+        part.flags.writeable = False
+        return part
 
 
 class Layout:
@@ -96,13 +100,13 @@ class Layout:
 
     def _flat(self, variable: Variable, value: Value) -> Value:
         """Return a value as one number, or row by row."""
-        if type(value) is float:
+        if type(value) in FLOATS:
             return value
         try:
-            given = np.asarray(value, dtype=np.float64)
-        except (TypeError, ValueError) as error:
+            given = real_array(value)
+        except (TypeError, ValueError, OverflowError) as error:
             raise DeclarationError(
-                f"{self.automaton.name}: the value computed for {variable.name} is {value!r}: {_remedy(variable)}."
+                f"{self.automaton.name}: the value computed for {variable.name} is {told(value)}: {_remedy(variable)}."
             ) from error
         if given.shape not in ((), variable.shape):
             raise DeclarationError(

@@ -8,16 +8,17 @@ section 1.4.1).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from hybrid_model.automaton import HybridAutomaton
+from hybrid_model.class_body import require_sound_body
 from hybrid_model.errors import DeclarationError, SimulationError
 from hybrid_model.margins import least
-from hybrid_model.transitions import Assignments, Jump, TimeEvent
+from hybrid_model.transitions import Assignments, Jump, TimeEvent, require_maps
 from hybrid_model.variables import DiscreteState, Value, Values
 
 
@@ -38,6 +39,9 @@ class Mode:
     name: str
     flow_map: Callable[[Any, Values], Assignments] | None = None
     invariant: Callable[[Any, Values], Value] | None = None
+
+    def __post_init__(self) -> None:
+        require_maps(self, *(name for name in ("flow_map", "invariant") if getattr(self, name) is not None))
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,9 @@ class Switch:
     guard: Callable[[Any, Values], Value]
     reset: Callable[[Any, Values], Assignments] | None = None
 
+    def __post_init__(self) -> None:
+        require_maps(self, "guard", *(["reset"] if self.reset is not None else []))
+
 
 @dataclass(frozen=True)
 class TimedSwitch:
@@ -81,6 +88,9 @@ class TimedSwitch:
     time: Callable[[Any, Values], Value]
     reset: Callable[[Any, Values], Assignments] | None = None
 
+    def __post_init__(self) -> None:
+        require_maps(self, "time", *(["reset"] if self.reset is not None else []))
+
 
 class ModalAutomaton(HybridAutomaton):
     """Base class of classical hybrid automata: write ``modes`` and ``switches`` beside the variables.
@@ -97,9 +107,19 @@ class ModalAutomaton(HybridAutomaton):
 
     modes: ClassVar[tuple[Mode, ...]]
     switches: ClassVar[tuple[Switch | TimedSwitch, ...]] = ()
+    written_by_authors: ClassVar[frozenset[str]] = HybridAutomaton.written_by_authors - {"flow_map", "flow_set"} | {
+        "modes",
+        "switches",
+    }
+    listed: ClassVar[Mapping[str, tuple[type, ...]]] = {
+        **HybridAutomaton.listed,
+        "modes": (Mode,),
+        "switches": (Switch, TimedSwitch),
+    }
     mode = DiscreteState(0, integer=True, output=True, description="index of the present mode")
 
     def __init__(self, name: str | None = None, **values: Any) -> None:
+        require_sound_body(type(self), self.listed)
         self.name = name or type(self).__name__
         self.mode_names = tuple(mode.name for mode in getattr(type(self), "modes", ()))
         if not self.mode_names or len(set(self.mode_names)) < len(self.mode_names):

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from hybrid_model.errors import DeclarationError, SimulationError
 from hybrid_model.layout import Layout, Place
+from hybrid_model.real_numbers import real_array, told
 from hybrid_model.variables import FloatArray, Kind, Variable, start_array, unknown_name
 
 
@@ -151,9 +152,9 @@ def _finite_breakpoints(name: str, signal: Signal) -> list[float]:
 def _sample(variable: Variable, signal: Callable[[float], npt.ArrayLike], t: float) -> FloatArray:
     given = signal(t)
     try:
-        value = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise SimulationError(f"input {variable.name} is {given!r} at t = {t:.9g} s: return numbers.") from error
+        value = real_array(given)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SimulationError(f"input {variable.name} is {told(given)} at t = {t:.9g} s: return numbers.") from error
     if value.shape not in ((), variable.shape):
         raise SimulationError(
             f"input {variable.name} has shape {variable.shape}, but its function gives shape {value.shape} at "

@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hybrid_model.automaton import RESERVED, HybridAutomaton
+from hybrid_model.automaton import HybridAutomaton
+from hybrid_model.class_body import RESERVED
 from hybrid_model.errors import DeclarationError
 from hybrid_model.transitions import Assignments, Clock, TimeEvent
 from hybrid_model.variables import (

@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from hybrid_model.errors import DeclarationError
+from hybrid_model.signatures import require_map
 from hybrid_model.variables import Value, Values
 
 Assignments = Mapping[str, Value]
@@ -64,6 +66,9 @@ class Jump:
     jump_set: Callable[[Any, Values], Value]
     jump_map: Callable[[Any, Values], Assignments]
 
+    def __post_init__(self) -> None:
+        require_maps(self, "jump_set", "jump_map")
+
 
 @dataclass(frozen=True)
 class TimeEvent:
@@ -87,6 +92,31 @@ class TimeEvent:
     time: Callable[[Any, Values], Value]
     jump_map: Callable[[Any, Values], Assignments]
     internal: bool = False
+
+    def __post_init__(self) -> None:
+        require_maps(self, "time", "jump_map")
+
+
+def require_maps(transition: Any, *maps: str) -> None:
+    """Require that a transition or a mode has a name, and functions of the instance and its values.
+
+    Parameters
+    ----------
+    transition : Jump, TimeEvent, Mode, Switch or TimedSwitch
+        What an author wrote.
+    *maps : str
+        Names of its functions.
+
+    Raises
+    ------
+    DeclarationError
+        With what to write.
+    """
+    kind = type(transition).__name__
+    if not isinstance(transition.name, str):
+        raise DeclarationError(f"{kind} has the name {transition.name!r}: give a text first, hm.{kind}('name', ...).")
+    for name in maps:
+        require_map(f"{name} of {kind} {transition.name!r}", getattr(transition, name))
 
 
 class Clock:

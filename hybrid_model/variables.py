@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import enum
+import numbers
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NoReturn, Self, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from hybrid_model.errors import DeclarationError
+from hybrid_model.real_numbers import real_array, told
+from hybrid_model.signatures import require_call
 
 FloatArray = npt.NDArray[np.float64]
 Value = Any
@@ -89,7 +92,48 @@ class Variable:
         return replace(self, name=name, dimensions=tuple(scope + dimension for dimension in self.dimensions))
 
 
-class Dimension:
+class ClassAttribute:
+    """What an author declares in the body of a class and executions read from a run, never from the instance.
+
+    An instance has no such attribute: a value set there would be ignored, and one read there would be frozen in an FMU.
+    """
+
+    _name = ""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, instance: object, owner: type) -> NoReturn: ...
+    def __get__(self, instance: object | None, owner: type) -> Self:
+        """Return the declaration of a class; refuse the attribute of an instance."""
+        if instance is None:
+            return self
+        raise DeclarationError(
+            f"{owner.__name__}.{self._name} is one of the {self.plural()}, whose values an instance does not hold: "
+            f"write s.{self._name} in a map, and arc[{self._name!r}] for a run."
+        )
+
+    def __set__(self, instance: object, value: object) -> None:
+        """Refuse a value of an instance that is there already."""
+        cls = type(instance).__name__
+        raise DeclarationError(
+            f"{cls}.{self._name} is one of the {self.plural()}, whose values are given when an instance is made: write "
+            f"{cls}({self._name}={told(value)}){self.otherwise()}."
+        )
+
+    def otherwise(self) -> str:
+        """Return what else somebody may have wanted who sets the attribute of an instance."""
+        return ""
+
+    def plural(self) -> str:
+        """Return what such attributes are called in messages."""
+        return "declarations"
+
+
+class Dimension(ClassAttribute):
     """A length that an automaton's vectors share, fixed when an instance is made.
 
     ``degree = Dimension()`` and ``neighbours = Input(0.0, shape="degree")`` make a block for any number of
@@ -99,8 +143,12 @@ class Dimension:
     def __init__(self, description: str = "") -> None:
         self.description = description
 
+    def plural(self) -> str:
+        """See `ClassAttribute.plural`."""
+        return "dimensions"
 
-class Declaration:
+
+class Declaration(ClassAttribute):
     """A variable as the author of an automaton writes it: a class attribute without a name yet.
 
     Parameters
@@ -109,8 +157,8 @@ class Declaration:
         Start value; a scalar stands for every element when a shape is given.
     unit, description : str
         See `Variable`.
-    shape : str or tuple of str, optional
-        Names of the automaton's `Dimension` attributes.
+    shape : str or int or tuple, optional
+        Names of the automaton's `Dimension` attributes; or, for the same shape in every instance, its lengths.
     minimum, maximum, nominal : float, optional
         See `Variable`.
     **traits : bool
@@ -119,13 +167,18 @@ class Declaration:
 
     kind: Kind
 
+    def __new__(cls, *given: Any, **options: Any) -> Self:
+        """Say which options there are where one is unknown."""
+        require_call(f"hm.{cls.__name__}", cls, given, options)
+        return super().__new__(cls)
+
     def __init__(
         self,
         start: npt.ArrayLike = 0.0,
         *,
         unit: str = "",
         description: str = "",
-        shape: str | tuple[str, ...] = (),
+        shape: str | int | tuple[str, ...] | tuple[int, ...] = (),
         minimum: float | None = None,
         maximum: float | None = None,
         nominal: float | None = None,
@@ -135,8 +188,24 @@ class Declaration:
         self.minimum, self.maximum, self.nominal = minimum, maximum, nominal
         self.unit = unit
         self.description = description
-        self.shape = (shape,) if isinstance(shape, str) else shape
+        lengths = shape if isinstance(shape, tuple) else (shape,)
+        self.shape = tuple(name for name in lengths if isinstance(name, str))
         self.traits = traits
+        if not self.shape and lengths:
+            self.start = _filled(start, lengths)
+        elif len(self.shape) < len(lengths):
+            raise DeclarationError(
+                f"shape = {shape!r} mixes names and lengths: give names of Dimension attributes, or whole numbers only."
+            )
+
+    def plural(self) -> str:
+        """See `ClassAttribute.plural`."""
+        return self.kind.value
+
+    def otherwise(self) -> str:
+        """See `ClassAttribute.otherwise`."""
+        reset = self.kind in (Kind.STATE, Kind.DISCRETE)
+        return f", and return {{{self._name!r}: ...}} from a jump map" if reset else ""
 
     def named(self, owner: str, name: str, value: npt.ArrayLike, sizes: Mapping[str, int]) -> Variable:
         """Make the variable `name` of automaton `owner` with start value `value`.
@@ -177,6 +246,10 @@ class Declaration:
         )
 
     def _check_range(self, name: str, start: FloatArray) -> None:
+        for option in ("minimum", "maximum", "nominal"):
+            value = getattr(self, option)
+            if not (value is None or isinstance(value, numbers.Real)):
+                raise DeclarationError(f"{name} has the {option} {value!r}: give a number, or leave it out.")
         low = -np.inf if self.minimum is None else self.minimum
         high = np.inf if self.maximum is None else self.maximum
         if not low <= high:
@@ -192,6 +265,17 @@ class Declaration:
             )
 
 
+def _filled(start: npt.ArrayLike, lengths: tuple[Any, ...]) -> FloatArray:
+    """Return the start value of a variable whose shape is given by numbers."""
+    try:
+        return np.broadcast_to(start_array("start", start), lengths)
+    except (TypeError, ValueError) as error:
+        raise DeclarationError(
+            f"shape = {lengths!r} does not fit the start value {told(start)}: leave it out, since an array has its "
+            "shape, or give whole numbers of elements."
+        ) from error
+
+
 def start_array(name: str, value: npt.ArrayLike) -> FloatArray:
     """Return `value` as an array of finite floats, or say which variable is not one.
 
@@ -201,9 +285,11 @@ def start_array(name: str, value: npt.ArrayLike) -> FloatArray:
         If the value is not a number or not finite.
     """
     try:
-        array = np.array(value, dtype=np.float64)
+        array = real_array(value)
+    except OverflowError as error:
+        raise DeclarationError(f"{name} = {told(value)} is too large: numbers end at 1.8e308.") from error
     except (TypeError, ValueError) as error:
-        raise DeclarationError(f"{name} = {value!r} is not a number or an array of numbers.") from error
+        raise DeclarationError(f"{name} = {told(value)} is not a number or an array of numbers.") from error
     if not np.all(np.isfinite(array)):
         raise DeclarationError(f"{name} = {value!r} is not finite: start values and parameters must be finite numbers.")
     return array
@@ -323,10 +409,27 @@ class Values:
     """The values of an automaton's variables at one instant: ``s.h``, ``s["agent1.x"]``, and the time ``s.t``."""
 
     __slots__ = ("_owner", "_values")
+    _owner: str
+    _values: dict[str, Value]
 
     def __init__(self, owner: str, values: dict[str, Value]) -> None:
-        self._owner = owner
-        self._values = values
+        # Past `__setattr__`: values are made in the inner loop of every execution.
+        _set_owner(self, owner)
+        _set_values(self, values)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not name.startswith("_"):
+            self[name] = value
+        object.__setattr__(self, name, value)
+
+    def __setitem__(self, name: str, value: object) -> None:
+        raise DeclarationError(
+            f"{self._owner}: {name} cannot be set on the values: return the new ones instead, from a jump map as "
+            f"{{{name!r}: ...}}."
+        )
+
+    def __repr__(self) -> str:
+        return f"{self._owner}: {', '.join(f'{name} = {self[name]}' for name in self._values)}"
 
     def __getitem__(self, name: str) -> Value:
         try:
@@ -338,6 +441,9 @@ class Values:
         if name.startswith("__"):
             raise AttributeError(name)
         return self[name]
+
+
+_set_owner, _set_values = (vars(Values)[slot].__set__ for slot in Values.__slots__)
 
 
 def unknown_name(owner: str, name: str, known: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 from hybrid_model.arc import HybridArc
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DataError, DeclarationError
+from hybrid_model.real_numbers import real_array, told
 from hybrid_model.samples import Samples
 from hybrid_model.signals import InputValue, Signal, unknown_input
 from hybrid_model.transitions import Assignments, Trigger
@@ -214,9 +215,9 @@ def _value(variable: Variable, flat: FloatArray) -> Any:
 def _input(variable: Variable, given: Any) -> Any:
     """Return an input that somebody gave, as a number or an array of the input's shape."""
     try:
-        array = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise DeclarationError(f"input {variable.name} is {given!r}: give numbers.") from error
+        array = real_array(given)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DeclarationError(f"input {variable.name} is {told(given)}: give numbers.") from error
     if array.shape not in ((), variable.shape):
         raise DeclarationError(
             f"input {variable.name} has shape {variable.shape}, but the value given has shape {array.shape}: give one "
@@ -240,7 +241,12 @@ def _vector(variables: list[Variable], assigned: Assignments, otherwise: FloatAr
 
 
 def _flat(variable: Variable, value: Any) -> FloatArray:
-    array = np.asarray(value, dtype=np.float64)
+    try:
+        array = real_array(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DeclarationError(
+            f"the value computed for {variable.name} is {told(value)}: return one number, or an array of numbers."
+        ) from error
     if array.shape not in ((), variable.shape):
         raise DeclarationError(
             f"the value computed for {variable.name} has shape {array.shape}, but {variable.name} has shape "

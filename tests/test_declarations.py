@@ -320,6 +320,9 @@ def test_computed_start_values_must_all_be_given_and_no_others():
     class Computed(BouncingBall):
         apex = hm.DiscreteState(computed=True)
 
+        def start_map(self, s):
+            return {}
+
     with pytest.raises(hm.DeclarationError, match=r"start_map of Computed must also give \['apex'\]"):
         run(Computed())
     wrong = type("Computed", (Computed,), {"start_map": lambda self, s: {"apex": s.h, "h": 3.0}})
