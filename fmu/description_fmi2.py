@@ -17,6 +17,7 @@ from fmu.description_parts import (
     start_text,
     summary,
     to_bytes,
+    unit_attributes,
 )
 from fmu.description_structure import Unknown
 from fmu.quantities import quantity
@@ -110,11 +111,7 @@ def _variable(listed: ET.Element, description: Description, reference: int) -> N
     if variable.initial is not None:
         attributes["initial"] = variable.initial
     element = ET.SubElement(listed, "ScalarVariable", attributes)
-    typed: dict[str, str] = {}
-    if variable.type is FmiType.FLOAT64 and variable.unit:
-        unit = xml_text(variable.unit)
-        typed |= {"declaredType": description.types[unit]} if unit in description.types else {}
-        typed["unit"] = unit
+    typed = unit_attributes(description, variable)
     if variable.start is not None:
         typed["start"] = start_text(variable)
     typed |= range_attributes(variable)

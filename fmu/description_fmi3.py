@@ -17,6 +17,7 @@ from fmu.description_parts import (
     start_text,
     summary,
     to_bytes,
+    unit_attributes,
 )
 from fmu.description_structure import Unknown
 from fmu.quantities import quantity
@@ -115,10 +116,7 @@ def _variable(listed: ET.Element, description: Description, reference: int) -> N
         attributes["intermediateUpdate"] = "true"
     if variable.initial is not None:
         attributes["initial"] = variable.initial
-    if variable.type is FmiType.FLOAT64 and variable.unit:
-        unit = xml_text(variable.unit)
-        attributes |= {"declaredType": description.types[unit]} if unit in description.types else {}
-        attributes["unit"] = unit
+    attributes |= unit_attributes(description, variable)
     if variable.start is not None:
         attributes["start"] = start_text(variable)
     attributes |= range_attributes(variable)

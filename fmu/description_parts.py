@@ -13,6 +13,7 @@ from typing import Any
 from fmu.description_jumps import states_reset
 from fmu.description_names import variable_names, xml_text
 from fmu.description_structure import Structure, model_structure
+from fmu.experiment import proposed_step
 from fmu.quantities import display_attributes, quantity
 from fmu.units import base_unit
 from fmu.variables import Bank, FmiType, FmuVariable
@@ -42,7 +43,7 @@ class Description:
     kinds : collection of {"cs", "me"}
         Co-Simulation, Model Exchange.
     stop_time, step_size : float or None
-        Of the default experiment, in s.
+        Of the default experiment, in s, where the author gives them.
     sources : sequence of str
         C files to compile, relative to ``sources/``; FMI 2.0 lists them in the description.
     """
@@ -60,6 +61,11 @@ class Description:
         """The automaton described."""
         found: Automaton = self.traced.automaton
         return found
+
+    @property
+    def proposed_step(self) -> float | None:
+        """Communication step in s that the default experiment proposes."""
+        return self.step_size or proposed_step(self.automaton, self.stop_time)
 
     @property
     def identifier(self) -> str:
@@ -97,12 +103,16 @@ class Description:
 
     @cached_property
     def types(self) -> dict[str, str]:
-        """Names of the type definitions by unit; none is the name of a variable."""
+        """Names of the type definitions by unit; none is the name of a variable.
+
+        None where a unit for display has an offset: fmpy takes a value in that unit for a difference if the variable
+        has a declared type, so 25 degC would become 25 K. The quantity stands at the variable there.
+        """
         taken = set(self.names)
         found = {}
         for unit in self.units:
             known = quantity(unit)
-            if known is not None:
+            if known is not None and not any("offset" in display_attributes(unit, shown) for shown in known.displays):
                 name = known.name
                 while name in taken:
                     name += "Type"
@@ -151,6 +161,17 @@ def number(value: float) -> str:
         whole = abs(value) < 1e15 and value == int(value)
         return f"{value:.0f}" if whole else repr(float(value))
     return "NaN" if math.isnan(value) else "INF" if value > 0 else "-INF"
+
+
+def unit_attributes(description: Description, variable: FmuVariable) -> dict[str, str]:
+    """Return the attributes that say what a variable measures: its type or quantity, and its unit."""
+    if variable.type is not FmiType.FLOAT64 or not variable.unit:
+        return {}
+    unit = xml_text(variable.unit)
+    measured = quantity(unit)
+    if unit in description.types:
+        return {"declaredType": description.types[unit], "unit": unit}
+    return ({"quantity": measured.name} if measured is not None else {}) | {"unit": unit}
 
 
 def start_text(variable: FmuVariable) -> str:
@@ -202,8 +223,8 @@ def add_default_experiment(root: ET.Element, description: Description) -> None:
     if description.stop_time is not None:
         experiment["stopTime"] = number(description.stop_time)
     experiment["tolerance"] = number(TOLERANCE)
-    if description.step_size is not None:
-        experiment["stepSize"] = number(description.step_size)
+    if description.proposed_step is not None:
+        experiment["stepSize"] = number(description.proposed_step)
     ET.SubElement(root, "DefaultExperiment", experiment)
 
 

@@ -18,6 +18,7 @@ import numpy.typing as npt
 import hybrid_model as hm
 from fmu.description_names import xml_text
 from fmu.description_parts import TOLERANCE, Description, number, to_bytes
+from fmu.experiment import round_step
 from fmu.variables import Bank, FmuVariable
 from hybrid_model.variables import FloatArray, Kind, element_names
 
@@ -32,8 +33,6 @@ first and after its last jump there: an importer without event mode has only the
 communication point. To be expected: the same jumps, times equal to 1e-7 s, continuous states to 1e-8 of their size.
 """
 _NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
-_ROWS = 500
-"""Steps of a run for which no step size is given, at most twice as many: a round step is chosen."""
 _DIGITS = 12
 """Of the values: more than the run is exact to, and few enough for the same bytes from other C libraries."""
 
@@ -64,7 +63,7 @@ def reference_results(description: Description, stop_time: float) -> dict[str, b
         return {}
     arc = hm.simulate(description.automaton, stop_time)
     end = float(arc.t[-1])
-    step = description.step_size or round_step(stop_time)
+    step = description.proposed_step or round_step(stop_time)
     results = _results(arc, _grid(arc, end, step), shown)
     experiment = _experiment(description, end, step)
     related = {
@@ -80,20 +79,6 @@ def reference_results(description: Description, stop_time: float) -> dict[str, b
     members["fmi-ls-manifest.xml"] = _manifest(related)
     told = _NOTE.format(name=xml_text(description.automaton.name), end=number(end), digits=_DIGITS)
     return {f"{FOLDER}/{name}": content for name, content in members.items()} | {NOTE: told.encode()}
-
-
-def round_step(stop_time: float) -> float:
-    """Return a step of 1, 2 or 5 times a power of ten that divides a run into 200 to 500 parts.
-
-    Parameters
-    ----------
-    stop_time : float
-        Length of the run in s, above zero.
-    """
-    least = stop_time / _ROWS
-    power = math.floor(math.log10(least))
-    factor = next(factor for factor in (1, 2, 5, 10) if factor * 10.0**power >= least * (1 - 1e-12))
-    return float(f"{factor}e{power}")
 
 
 def _shown(description: Description) -> list[tuple[str, str, int | None]]:

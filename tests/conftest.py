@@ -31,8 +31,8 @@ def exported(tmp_path_factory):
         root = root.parent
     own = tmp_path_factory.mktemp("exports")
 
-    def export(automaton, key=None, fmi="3.0"):
-        key = (key or automaton.name) + ("" if fmi == "3.0" else f"-fmi{fmi}")
+    def export(automaton, key=None, fmi="3.0", clocks=True):
+        key = (key or automaton.name) + ("" if fmi == "3.0" else f"-fmi{fmi}") + ("" if clocks else "-no-clocks")
         folder = root / "fmus" / fingerprint(automaton)
         folder.mkdir(parents=True, exist_ok=True)
         path, claim = folder / f"{key}.fmu", folder / f"{key}.claim"
@@ -44,7 +44,7 @@ def exported(tmp_path_factory):
                 time.sleep(0.05)
                 continue
             try:
-                os.replace(export_fmu(automaton, own / f"{key}.fmu", fmi=fmi), path)
+                os.replace(export_fmu(automaton, own / f"{key}.fmu", fmi=fmi, clocks=clocks), path)
             finally:
                 claim.rmdir()
         return path

@@ -18,7 +18,8 @@ import hybrid_model as hm
 from fmu.archive import archive_content
 from fmu.build import package
 from fmu.code import model_code
-from fmu.reference_results import FOLDER, round_step
+from fmu.experiment import round_step
+from fmu.reference_results import FOLDER
 from fmu.trace import trace
 from fmu.variables import Fmi, fmu_variables
 from hybrid_model.models import BouncingBall

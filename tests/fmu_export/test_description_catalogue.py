@@ -116,6 +116,25 @@ def test_units_types_and_start_values_of_the_ball(fmi):
     assert root.get("description") == "A ball on a floor; impacts lose energy."
 
 
+@pytest.mark.parametrize("fmi", BOTH)
+def test_a_quantity_whose_display_unit_has_an_offset_has_no_declared_type(fmi):
+    class Body(hm.HybridAutomaton):
+        T = hm.State(300.0, unit="K")
+        p = hm.Parameter(1e5, unit="Pa")
+
+        def flow_map(self, s):
+            return {"T": 0.0}
+
+    root = ET.fromstring(WRITERS[fmi](described(Body(), fmi)))
+    typed = {e.get("name"): (e if fmi is Fmi.V3_0 else e[0]).attrib for e in root.find("ModelVariables")}
+    assert "declaredType" not in typed["T"]
+    assert (typed["T"]["quantity"], typed["T"]["unit"]) == ("ThermodynamicTemperature", "K")
+    assert typed["p"]["declaredType"] == "Pressure"
+    assert [e.get("name") for e in root.find("TypeDefinitions")] == ["Pressure", "Time"]
+    [kelvin] = [e for e in root.find("UnitDefinitions") if e.get("name") == "K"]
+    assert float(kelvin.find("DisplayUnit").get("offset")) == -273.15
+
+
 def test_states_that_no_jump_changes_are_not_reinitialised():
     class Block(hm.HybridAutomaton):
         kept = hm.State(1.0)
