@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from hybrid_model.arc_values import ArcValues, ComputedValues
 from hybrid_model.automaton import Automaton
-from hybrid_model.errors import DeclarationError
+from hybrid_model.errors import DataError, DeclarationError
 from hybrid_model.flow_record import FlowRecord as FlowRecord
 from hybrid_model.samples import Samples
 from hybrid_model.stop import Stop
@@ -325,10 +325,31 @@ class HybridArc:
         return dataset(self, names)
 
     def save(self, path: str | Path) -> None:
-        """Write the arc to a file that `load_arc` reads, see `hybrid_model.arc_file`."""
+        """Write the arc to a file; its name decides in which form.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``*.npz``: the complete arc, which `load_arc` reads, see `hybrid_model.arc_file`. ``*.csv``: the samples
+            alone, which `Samples.from_csv` reads.
+
+        Raises
+        ------
+        DataError
+            For a name with another ending.
+        """
         from hybrid_model.arc_file import save_arc
 
-        save_arc(self._read, self._flows, self, Path(path))
+        ending = Path(path).suffix.lower()
+        if ending == ".csv":
+            self.samples().to_csv(path)
+        elif ending == ".npz":
+            save_arc(self._read, self._flows, self, Path(path))
+        else:
+            raise DataError(
+                f"{path} ends in {ending!r}, but an arc is saved as .npz, which hm.load_arc reads, or as .csv, its "
+                "samples alone: give one of these endings."
+            )
 
     def _table(
         self, names: Iterable[str] | None, points: Sequence[tuple[float, FloatArray, FloatArray]]

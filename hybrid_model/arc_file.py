@@ -53,7 +53,7 @@ def save_arc(read: ArcValues, flows: Sequence[FlowRecord], arc: HybridArc, path:
     arc : HybridArc
         The arc.
     path : Path
-        Where to write, by convention ``*.npz``; an existing file is replaced.
+        Where to write; an existing file is replaced.
     """
     samples = np.array([read.channels(t, x, flow.z) for flow in flows for t, x in flow.points])
     scale = np.max(np.abs(samples), axis=0, initial=0.0)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from hybrid_model.csv_table import read_table
 from hybrid_model.errors import DataError
 from hybrid_model.variables import FloatArray
 
@@ -93,32 +94,31 @@ class Samples:
 
     @classmethod
     def from_dataframe(cls, frame: Any) -> Samples:
-        """Take the samples of a pandas DataFrame with index levels, or columns, ``t`` and ``j``.
+        """Take the samples of a pandas DataFrame with index levels, or columns, as `from_csv` reads them from a file.
 
         Raises
         ------
         DataError
-            If t or j is missing, or a column does not hold numbers.
+            If there is no time, or a column does not hold numbers.
         """
-        table = frame.reset_index() if {"t", "j"} & set(frame.index.names) else frame
+        table = frame.reset_index() if {"t", "time", "j"} & set(frame.index.names) else frame
         return _from_table({str(name): table[name].to_numpy() for name in table.columns}, "the table")
 
     @classmethod
     def from_csv(cls, path: str | Path) -> Samples:
-        """Read a file of comma-separated values with a line of names, two of which are ``t`` and ``j``.
+        """Read a file of comma-separated values: a line of names, then one line a sample.
+
+        Of the names one is the time in s, ``t`` or, as other programs write, ``time``; ``j`` counts jumps. Without a
+        column ``j`` a jump is where a time comes again with other values: its two sides are two lines of one time, and
+        a cascade of n jumps is n + 1 lines. Two equal lines are one sample. The other names are variables: ``h``, for
+        elements of arrays ``w[1]``, ``w[2]``, ``m[2,1]``. For the numbers see `hybrid_model.csv_table.read_table`.
 
         Raises
         ------
         DataError
-            If t or j is missing, a row has another length than the line of names, or something is not a number.
+            If there is no time, or the file is no table of numbers; with file, line and column.
         """
-        with Path(path).open(newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file) if row]
-        names = [name.strip() for name in rows[0]] if rows else []
-        for number, row in enumerate(rows[1:], start=2):
-            if len(row) != len(names):
-                raise DataError(f"{path}: row {number} has {len(row)} fields, but the line of names has {len(names)}.")
-        return _from_table({name: [row[k] for row in rows[1:]] for k, name in enumerate(names)}, str(path))
+        return _from_table(read_table(path), str(path))
 
     def to_csv(self, path: str | Path) -> None:
         """Write the samples as comma-separated values, so exactly that `from_csv` gives them back bit by bit."""
@@ -131,11 +131,25 @@ class Samples:
 
 
 def _from_table(table: Mapping[str, Any], what: str) -> Samples:
-    missing = [name for name in ("t", "j") if name not in table]
-    if missing:
-        raise DataError(f"{what} has no column {' and no column '.join(missing)}; it has {', '.join(table)}.")
-    columns = {name: column for name, column in table.items() if name not in ("t", "j")}
-    return Samples.from_columns(_numbers("t", table["t"]), _numbers("j", table["j"]), columns)
+    time = next((name for name in ("t", "time") if name in table), None)
+    if time is None:
+        raise DataError(
+            f"{what} has no column t or time; it has {', '.join(table) or 'none'}: the first line names the columns, "
+            "one of them the time in s."
+        )
+    columns = {name: _numbers(name, column) for name, column in table.items() if name not in (time, "j")}
+    t = _numbers(time, table[time])
+    return Samples.from_columns(t, _numbers("j", table["j"]) if "j" in table else _jumps(t, columns), columns)
+
+
+def _jumps(t: FloatArray, columns: Mapping[str, FloatArray]) -> npt.NDArray[np.int64]:
+    """Count the jumps of a table without a column for them: a time that comes again with other values."""
+    changed = np.zeros(max(t.size - 1, 0), dtype=bool)
+    for column in columns.values():
+        if column.shape[:1] == t.shape:
+            other = (column[1:] != column[:-1]) & ~(np.isnan(column[1:]) & np.isnan(column[:-1]))
+            changed |= other.any(axis=tuple(range(1, other.ndim)))
+    return np.concatenate([np.zeros(min(t.size, 1)), np.cumsum((np.diff(t) == 0.0) & changed)]).astype(np.int64)
 
 
 def _numbers(name: str, given: npt.ArrayLike | Sequence[str]) -> FloatArray:

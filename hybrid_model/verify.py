@@ -67,7 +67,7 @@ def verify(
     Raises
     ------
     DataError
-        If the data are no samples, or a state is missing or has the wrong shape.
+        If the data are no samples, or none at all, or a state is missing or has the wrong shape.
     DeclarationError
         If `automaton` is no instance of an automaton, an input is unknown, or a value has the wrong shape.
     SimulationError
@@ -77,6 +77,10 @@ def verify(
     require_inputs(inputs)
     require_options("tolerances", tolerances, Tolerances, first="rtol")
     data = data if isinstance(data, HybridArc) else _samples(data)
+    if isinstance(data, Samples) and not len(data):
+        raise DataError(
+            f"the data hold no sample, so nothing can be said about {automaton.name}: give at least one row."
+        )
     subject = Subject(automaton, data, inputs)
     tolerances = tolerances or Tolerances()
     findings = Findings(subject.samples)

@@ -74,7 +74,7 @@ class Subject:
         self, automaton: Automaton, data: Samples | HybridArc, inputs: Mapping[str, InputValue] | None = None
     ) -> None:
         self.automaton = automaton
-        self.samples = data.samples() if isinstance(data, HybridArc) else data
+        self.samples = data.samples() if isinstance(data, HybridArc) else _own_names(automaton, data)
         self._states = automaton.of_kind(Kind.STATE)
         self._discrete = automaton.of_kind(Kind.DISCRETE)
         self.x = self._columns(self._states)
@@ -205,6 +205,16 @@ class Subject:
             return _value(variable, (1.0 - part) * column[k] + part * column[k + 1])
 
         return source
+
+
+def _own_names(automaton: Automaton, samples: Samples) -> Samples:
+    """Return samples under the automaton's own names, where a co-simulation has put the block's before them."""
+    states = {v.name for v in automaton.of_kind(Kind.STATE, Kind.DISCRETE)}
+    scope = f"{automaton.name}."
+    if states & set(samples.values) or not states <= {name.removeprefix(scope) for name in samples.values}:
+        return samples
+    own = {name.removeprefix(scope): value for name, value in samples.values.items() if name.startswith(scope)}
+    return Samples(samples.t, samples.j, own)
 
 
 def _value(variable: Variable, flat: FloatArray) -> Any:

@@ -268,6 +268,19 @@ def test_truncated_files_are_refused_with_a_sentence(saved):
             hm.load_arc(saved)
 
 
+def test_the_name_of_a_file_decides_what_is_written(tmp_path):
+    ball = hm.simulate(BouncingBall(), 1.0)
+    ball.save(tmp_path / "ball.CSV")
+    back = hm.Samples.from_csv(tmp_path / "ball.CSV")
+    np.testing.assert_array_equal(back.t, ball.t)
+    np.testing.assert_array_equal(back["h"], ball["h"])
+    assert hm.verify(BouncingBall(), back).ok
+    for name in ("ball.mat", "ball", "ball.json"):
+        with pytest.raises(hm.DataError, match=r"an arc is saved as \.npz, which hm\.load_arc reads, or as \.csv"):
+            ball.save(tmp_path / name)
+        assert not (tmp_path / name).exists()
+
+
 @settings(deadline=None)
 @given(where=st.floats(0.0, 1.0, exclude_max=True), flip=st.integers(1, 255))
 def test_a_damaged_byte_is_told_or_harmless(tmp_path_factory, where, flip):

@@ -116,10 +116,17 @@ def test_pandas_reads_what_is_written_and_the_other_way_round(ball, tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "has no column t and no column j; it has "),
-        ("t,h\n0,1\n", "has no column j; it has t, h"),
-        ("t,j,h\n0,0\n", "row 2 has 2 fields, but the line of names has 3"),
-        ("t,j,h\n0,0,high\n", "h does not hold numbers only"),
+        ("", r"bad\.csv has no column t or time; it has none: the first line names the columns"),
+        ("h,j\n0,1\n", r"bad\.csv has no column t or time; it has h, j"),
+        ("t,j,h\n0,0\n", r"bad\.csv, line 2, column 3: the line has 2 fields, but the line of names has 3"),
+        ("t,j,h\n\n0,0,high\n", r"bad\.csv, line 3, column 3 \(h\): 'high' is not a number"),
+        ("t,j,h\n0,0,\n", r"bad\.csv, line 2, column 3 \(h\): the field is empty: give a number"),
+        ("t,h\n0,1,\n", r"bad\.csv, line 2, column 3: the line has 3 fields, .* 2: remove the comma at its end"),
+        ("t,h,\n0,1,\n", r"bad\.csv, line 1, column 3: the line ends with a comma: remove it, in every line"),
+        ("t,,h\n0,1,2\n", r"bad\.csv, line 1, column 2: the column has no name: give it one"),
+        ("t,h,h\n0,1,2\n", r"bad\.csv, line 1, column 3: the name h is there twice"),
+        ("t;h\n0;1\n", r"bad\.csv, line 1: names are separated by semicolons: separate them by commas"),
+        ("t,w\n0,1 2\n1,1\n", r"bad\.csv, line 3, column 2 \(w\): the field holds 1 numbers, .* first row 2"),
         ("t,j,h\n0,0.5,1\n", "j counts jumps, but holds numbers that are not whole"),
         ("t,j,w[1],w[3]\n0,0,1,2\n", r"the columns of w are \[\(1,\), \(3,\)\]: give every element of one array"),
         ("t,j,w,w[1]\n0,0,1,2\n", "the columns of w are"),
@@ -129,6 +136,53 @@ def test_tables_that_are_no_samples_are_refused(tmp_path, text, message):
     (tmp_path / "bad.csv").write_text(text)
     with pytest.raises(hm.DataError, match=message):
         hm.Samples.from_csv(tmp_path / "bad.csv")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (
+            "t,h\n0,1\n".encode("utf-16"),
+            r"bad\.csv, line 1, column 1: the file is in UTF-16, or is no text: save it as",
+        ),
+        ("t,h\n0,1\n".encode("utf-16-le"), r"bad\.csv, line 1, column 1: the file is in UTF-16"),
+        ("t,h\n0,1\n0,H\xf6he\n".encode("latin-1"), r"bad\.csv, line 3, column 2: this is no UTF-8: save the file as"),
+        (b't,h\n0,"1', r"bad\.csv, line 2: this is no line of comma-separated values: unexpected end of data"),
+    ],
+)
+def test_files_in_another_encoding_are_refused(tmp_path, content, message):
+    (tmp_path / "bad.csv").write_bytes(content)
+    with pytest.raises(hm.DataError, match=message):
+        hm.Samples.from_csv(tmp_path / "bad.csv")
+
+
+def test_without_a_column_of_jumps_a_time_that_comes_again_is_a_jump(tmp_path):
+    """Three sides at t = 1 are two jumps; the two equal lines at t = 2 are one sample."""
+    path = tmp_path / "run.csv"
+    path.write_bytes(
+        b'\xef\xbb\xbf"time", h ,on\r\n0,1,False\r\n1,2,False\r\n1,0,True\r\n1,0,false\r\n2,5,1\r\n2,5,1\r\n'
+    )
+    samples = hm.Samples.from_csv(path)
+    np.testing.assert_array_equal(samples.t, [0.0, 1.0, 1.0, 1.0, 2.0, 2.0])
+    np.testing.assert_array_equal(samples.j, [0, 0, 1, 2, 2, 2])
+    np.testing.assert_array_equal(samples["on"], [0.0, 0.0, 1.0, 0.0, 1.0, 1.0])
+    # A variable may be called time where t is there; not a number in place of a number is no change.
+    path.write_text("t,time,h\n0,5,nan\n0,5,nan\n1,6,nan\n")
+    samples = hm.Samples.from_csv(path)
+    assert (samples["time"].tolist(), samples.j.tolist()) == ([5.0, 5.0, 6.0], [0, 0, 0])
+
+
+def test_several_numbers_in_a_field_are_a_vector(tmp_path):
+    (tmp_path / "run.csv").write_text("time,w\n0,1 2\n0,3 4\n1, 3 4\n")
+    samples = hm.Samples.from_csv(tmp_path / "run.csv")
+    np.testing.assert_array_equal(samples["w"], [[1.0, 2.0], [3.0, 4.0], [3.0, 4.0]])
+    np.testing.assert_array_equal(samples.j, [0, 1, 1])
+
+
+def test_jumps_of_a_dataframe_are_found_likewise(ball):
+    frame = ball.to_dataframe().reset_index().rename(columns={"t": "time"}).drop(columns="j")
+    np.testing.assert_array_equal(hm.Samples.from_dataframe(frame).j, ball.j)
+    np.testing.assert_array_equal(hm.Samples.from_dataframe(frame.set_index("time")).t, ball.t)
 
 
 @pytest.mark.parametrize(

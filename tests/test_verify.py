@@ -4,6 +4,8 @@ import ast
 import dataclasses
 import pathlib
 
+import fmpy
+import fmpy.util
 import numpy as np
 import pytest
 from catalogue import cases
@@ -14,6 +16,7 @@ from semantics.small_automata import Corridor, PatientCorridor, Timer
 from test_agreement import python_run
 
 import hybrid_model as hm
+from cosim.cli.main import main
 from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.scenario import load_scenario
 from hybrid_model.layout import Layout
@@ -76,6 +79,40 @@ def ball_by_hand(impacts=3, shift=0.0, loss=E, points=5, height=1.0):
         v += list(v0 - G * since)
         t0, h0, v0 = t[-1], 0.0, -loss * v[-1]
     return hm.Samples(t, j, {"h": h, "v": v})
+
+
+@pytest.mark.parametrize("text", ["t,j,h,v\n", "time,h,v\n"])
+def test_of_no_data_nothing_can_be_said(tmp_path, text):
+    (tmp_path / "empty.csv").write_text(text)
+    with pytest.raises(hm.DataError, match="the data hold no sample, so nothing can be said about BouncingBall"):
+        hm.verify(BouncingBall(), hm.Samples.from_csv(tmp_path / "empty.csv"))
+
+
+def test_tables_of_fmpy_and_of_the_command_line_are_read(exported, tmp_path, capsys):
+    file = exported(BouncingBall())
+    fmpy.util.write_csv(
+        tmp_path / "fmpy.csv",
+        fmpy.simulate_fmu(
+            str(file), stop_time=2.0, use_event_mode=True, early_return_allowed=True, output_interval=0.1
+        ),
+    )
+    report = hm.verify(BouncingBall(), hm.Samples.from_csv(tmp_path / "fmpy.csv"))
+    # With both sides of the impacts at 0.45, 1.08, 1.53 and 1.84 s.
+    assert (report.ok, report.jumps) == (True, 4)
+    assert main(["cosim", str(file), "--stop-time", "0.4", "--output-file", str(tmp_path / "cosim.csv")]) == 0
+    assert hm.verify(BouncingBall(), hm.Samples.from_csv(tmp_path / "cosim.csv")).ok
+    assert main(["simulate", "paper-a", "--stop-time", "0.1", "--out", str(tmp_path)]) == 0
+    samples = hm.Samples.from_csv(tmp_path / "trajectory.csv")
+    assert samples["agent2.x"][0] == 2.0
+    capsys.readouterr()
+
+
+def test_names_with_the_block_before_them_as_in_a_co_simulation():
+    samples = ball_by_hand()
+    scoped = hm.Samples(samples.t, samples.j, {f"BouncingBall.{name}": samples[name] for name in samples.values})
+    assert hm.verify(BouncingBall(), scoped).ok
+    with pytest.raises(hm.DataError, match=r"the samples have no h, a state of other: give a column for each of h, v"):
+        hm.verify(BouncingBall("other"), scoped)
 
 
 def test_data_from_elsewhere_that_is_right_passes():
