@@ -23,7 +23,7 @@ class Fmi3Instance(FmuInstance):
         self.fmu.instantiate(
             eventModeUsed=events,
             earlyReturnAllowed=events,
-            logMessage=lambda environment, status, category, message: self.log(_text(message)),
+            logMessage=lambda environment, status, category, message: self.log(status, _text(message)),
         )
 
     def enter_initialization(self, t_start: float, t_stop: float) -> None:

@@ -49,10 +49,10 @@ class FmuInstance(ABC):
     name : str
         Of the instance.
     log : callable
-        Told each message of the FMU.
+        Told the status and the text of each message of the FMU.
     """
 
-    def __init__(self, description: Any, folder: Path, name: str, log: Callable[[str], None]) -> None:
+    def __init__(self, description: Any, folder: Path, name: str, log: Callable[[int, str], None]) -> None:
         self.name = name
         identifier = description.coSimulation.modelIdentifier
         self.fmu = self._load(description, folder, modelIdentifier=identifier, instanceName=name)

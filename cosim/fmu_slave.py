@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 import shutil
 import weakref
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import fmi3OK, fmi3Warning
 
 from cosim.errors import CosimError
 from cosim.fmi2_instance import Fmi2Instance
@@ -22,8 +24,14 @@ from fmu.importer.folders import temporary_folder
 from fmu.importer.loading import read_description
 from fmu.importer.unpacking import unpack
 
+OWN_TOOL = "hybrid-fmu"
+"""What FMUs that this project exports say of their tool."""
+MESSAGES = 100
+"""Most messages of one call that are kept."""
 MAX_PARTS = 10_000
-"""Most early returns within one communication step of a master that handles no events."""
+"""Most early returns without an event within one step."""
+ROUNDINGS = 8.0
+"""Times that differ by no more ulp are one: 3 * 0.1 and 0.3."""
 
 
 class FmuSlave(Slave):
@@ -73,9 +81,11 @@ class FmuSlave(Slave):
         )
         self.has_event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
         self.can_restore = bool(description.coSimulation.canGetAndSetFMUstate)
+        # FMI asks of others that they name their time events; the events on their states come unannounced.
+        self.foresees = str(description.generationTool).startswith(OWN_TOOL)
         experiment = description.defaultExperiment
         self.default_stop_time = float(experiment.stopTime) if experiment and experiment.stopTime else None
-        self._messages: list[str] = []
+        self._messages: deque[tuple[int, str]] = deque(maxlen=MESSAGES)
         self._description = description
         self._path = path
         self._loaded: FmuInstance | None = None
@@ -118,7 +128,7 @@ class FmuSlave(Slave):
             try:
                 with Archive(self._path) as archive:
                     unpack(archive, folder)
-                self._loaded = self._kind(self._description, folder, self.name, self._messages.append)
+                self._loaded = self._kind(self._description, folder, self.name, self._hear)
             except Exception as error:
                 shutil.rmtree(folder, ignore_errors=True)
                 raise CosimError(f"{self.name}: {self._path} cannot be loaded on this machine: {error}") from error
@@ -162,8 +172,10 @@ class FmuSlave(Slave):
         """See `Slave.step`."""
         instance = self._instance
         for _ in range(MAX_PARTS):
-            reached, event, terminate, early = self._call(instance.step, t, t_next)
-            if self._events or terminate or not early or reached >= t_next:
+            told, event, terminate, early = self._call(instance.step, t, t_next)
+            # The last successful time is where an FMU is only if it returned early (FMI 3.0.2 section 4.2).
+            reached = told if (early or terminate) and not _are_one(told, t_next) else t_next
+            if event or terminate or reached >= t_next:
                 return Step(reached, event, self._termination(terminate))
             if not reached > t:
                 raise CosimError(f"{self.name} returns from a step at {t:.17g} s and gets no further: {self._said()}")
@@ -187,7 +199,6 @@ class FmuSlave(Slave):
         if self._running is not None:
             self._running.free()
             self._running = None
-        self._messages.clear()
 
     @property
     def _instance(self) -> FmuInstance:
@@ -212,18 +223,25 @@ class FmuSlave(Slave):
             values[index] = number
         self._call(self._instance.set, variable, values)
 
+    def _hear(self, status: int, message: str) -> None:
+        self._messages.append((status, message))
+
     def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        self._messages.clear()
         try:
             return function(*arguments)
         except FMICallException as error:
             raise CosimError(f"{self.name}: {error.function} failed: {self._said()}") from error
 
     def _termination(self, terminate: bool) -> Termination | None:
-        # FMI has no reason for terminateSimulation; the FMUs that this project exports name it in their message.
-        return Termination(self._said(), "Zeno" in self._said()) if terminate else None
+        # FMI has no reason for terminateSimulation, which is no failure by itself; what goes with it on the log tells.
+        if not terminate:
+            return None
+        status, message = self._messages[-1] if self._messages else (fmi3OK, "")
+        return Termination(message, "Zeno" in message, failed=status > fmi3Warning)
 
     def _said(self) -> str:
-        return self._messages[-1] if self._messages else "the FMU logged no message"
+        return self._messages[-1][1] if self._messages else "the FMU logged no message"
 
 
 def _kind(description: Any) -> type[FmuInstance] | None:
@@ -235,6 +253,10 @@ def _kind(description: Any) -> type[FmuInstance] | None:
 def _interfaces(description: Any) -> str:
     offered = {"Co-Simulation": description.coSimulation, "Model Exchange": description.modelExchange}
     return " and ".join(name for name, interface in offered.items() if interface is not None) or "no interface"
+
+
+def _are_one(t: float, other: float) -> bool:
+    return abs(t - other) <= ROUNDINGS * math.ulp(max(abs(t), abs(other)))
 
 
 def _unload(fmu: Any, folder: Path) -> None:

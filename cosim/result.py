@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from hybrid_model.blocks import Termination
-from hybrid_model.scheduler import Tick
+from hybrid_model.scheduler import Event, Tick
 
-__all__ = ["CosimResult", "Ended", "Tick"]
+__all__ = ["CosimResult", "Ended", "Event", "Tick"]
 
 
 class Ended(enum.Enum):
@@ -19,7 +19,8 @@ class Ended(enum.Enum):
 
     HORIZON = "The stop time was reached."
     ZENO = "The jumps of a slave accumulate: end the run before that time, or change the slave as its message says."
-    TERMINATED = "A slave ended the run: its message says why and what to change."
+    TERMINATED = "A slave cannot go on: its message says why and what to change."
+    FINISHED = "A slave ended the run, as it may: run on without it, or take what there is."
 
 
 @dataclass
@@ -40,6 +41,8 @@ class CosimResult:
         Outputs at the end by ``slave.output``.
     steps : int
         Steps made by all slaves together.
+    events : list of Event
+        Instants at which slaves had events of their own, in order; of masters that handle events.
     """
 
     ended: Ended = Ended.HORIZON
@@ -50,11 +53,21 @@ class CosimResult:
     signals: dict[str, list[float]] = field(default_factory=dict)
     final: dict[str, float] = field(default_factory=dict)
     steps: int = 0
+    events: list[Event] = field(default_factory=list)
 
     def terminate(self, slave: str, t: float, why: Termination) -> None:
         """Note that a slave ended the run at `t` in s."""
-        self.ended = Ended.ZENO if why.zeno else Ended.TERMINATED
-        self.message, self.t = f"{slave}: {why.message}", t
+        self.t = t
+        if why.zeno or why.failed:
+            self.ended = Ended.ZENO if why.zeno else Ended.TERMINATED
+            self.message = f"{slave}: {why.message}"
+        else:
+            self.ended = Ended.FINISHED
+            self.message = f"{slave} ended the run at t = {t:.9g} s{f': {why.message}' if why.message else ''}"
+
+    def event_times(self, slave: str) -> npt.NDArray[np.float64]:
+        """Return the times in s at which a slave had events of its own."""
+        return np.array([event.t for event in self.events if event.block == slave])
 
     def tick_times(self, slave: str, clock: str) -> npt.NDArray[np.float64]:
         """Return the times in s at which a clock ticked."""

@@ -167,7 +167,7 @@ class FlowFunctions:
         if not self._fmi2:
             self._fmu.instantiate(logMessage=lambda environment, status, category, message: None)
             return None
-        callbacks = Callbacks(lambda message: None)
+        callbacks = Callbacks(lambda status, message: None)
         try:
             self._fmu.instantiate(callbacks=callbacks.functions)
         except Exception:

@@ -17,10 +17,13 @@ class Termination:
         In the block's words.
     zeno : bool
         Whether a Zeno guard did, as far as the block says.
+    failed : bool
+        Whether it did because it could not go on; else it came to an end of its own.
     """
 
     message: str
     zeno: bool
+    failed: bool = True
 
 
 @dataclass(frozen=True)
@@ -71,9 +74,15 @@ class Block(ABC):
     ----------
     name : str
         Unique among the blocks of a run.
+    foresees : bool
+        Whether the next event that it names is the first of all of its events; FMI asks that of time events alone.
+    can_restore : bool
+        Whether `save` and `restore` work.
     """
 
     name: str
+    foresees: bool = True
+    can_restore: bool = True
 
     @abstractmethod
     def set(self, name: str, value: float) -> None:

@@ -3,8 +3,8 @@
 Between two events a block's flow is its own, so the block itself predicts its next event (`nextEventTime` in FMI 3.0).
 The scheduler keeps those predictions in a queue, takes the earliest, lets that block jump, and brings only the
 receivers of what it sent to that instant. Nothing is rolled back, and an event costs as much as it has receivers,
-however many blocks there are. Blocks that cannot predict (they name no next event) are stepped to the earliest
-prediction of the others and may stop before it; only they are saved and restored.
+however many blocks there are. Blocks that cannot predict (they name no next event, or foresee only some of theirs) are
+stepped to the earliest prediction and may stop before it; only they are saved and restored.
 
 `hybrid_model.event_network` runs automata with it, `cosim.masters` FMUs and automata alike.
 """
@@ -23,7 +23,7 @@ from hybrid_model.errors import SchedulingError
 SIMULTANEOUS = 1e-9
 """In s: events of different blocks closer than this are handled at one instant, in the order of the blocks."""
 ITERATIONS = 10_000
-"""Event iterations of one block at one instant, at most."""
+"""Event iterations of one block at one instant, and steps of it in a row that lead nowhere, at most."""
 
 
 class Wire(Protocol):
@@ -51,6 +51,14 @@ class Tick:
     clock: str
 
 
+@dataclass(frozen=True)
+class Event:
+    """An event of a block, at `t` in s."""
+
+    t: float
+    block: str
+
+
 @dataclass
 class _Place:
     """A block and where it is."""
@@ -60,6 +68,7 @@ class _Place:
     t: float
     next_event: float | None = None
     version: int = 0
+    stalls: int = 0
 
 
 class Scheduler:
@@ -82,6 +91,8 @@ class Scheduler:
         Time in s up to which all events are handled.
     ticks : list of Tick
         Ticks of output clocks, in order.
+    events : list of Event
+        Instants at which blocks had events of their own, in order.
     steps : int
         Steps made by all blocks together.
     ended : (str, float, Termination) or None
@@ -97,6 +108,7 @@ class Scheduler:
     ) -> None:
         self.t = t_start
         self.ticks: list[Tick] = []
+        self.events: list[Event] = []
         self.steps = 0
         self.ended: tuple[str, float, Termination] | None = None
         self._wires_from = wires_from
@@ -117,12 +129,14 @@ class Scheduler:
             t, due = self._next_instant(limit)
             if not due:
                 break
+            self._note(t, due)
             self.handle_events(t, due)
         for name, place in self._places.items():
             while not self.ended and place.t < limit:
                 if self._step(place, limit).event and not self.ended:
                     self._require_announced(place, limit)
                     place.block.enter_event_mode()
+                    self._note(limit, {name})
                     self.handle_events(limit, {name})
         if not self.ended:
             self.t = limit
@@ -159,6 +173,9 @@ class Scheduler:
         for name in touched:
             self._leave_event_mode(name)
 
+    def _note(self, t: float, due: Collection[str]) -> None:
+        self.events += [Event(t, name) for name in sorted(due, key=lambda n: self._places[n].order)]
+
     def _send(self, name: str, t: float, touched: set[str]) -> set[str]:
         """Carry the outputs of a block to their receivers; return those for whom something changed."""
         receivers: set[str] = set()
@@ -169,6 +186,7 @@ class Scheduler:
             if place.block.get(wire.input) == value:
                 continue
             if wire.target not in touched and wire.target not in receivers:
+                self._require_behind(place, t, name)
                 self._bring(place, t)
             place.block.set(wire.input, value)
             receivers.add(wire.target)
@@ -180,6 +198,13 @@ class Scheduler:
             self._step(place, t)
             self._require_announced(place, t)
         place.block.enter_event_mode()
+
+    def _require_behind(self, place: _Place, t: float, sender: str) -> None:
+        if place.t > t + self._tolerance:
+            raise SchedulingError(
+                f"{sender} sends to {place.block.name} at t = {t:.12g} s, but {place.block.name} is at "
+                f"{place.t:.12g} s already and cannot return to an earlier state: use the fixed-step master."
+            )
 
     def _require_announced(self, place: _Place, t: float) -> None:
         """Refuse a stop before `t`; within the tolerance before it, it is rounding."""
@@ -197,19 +222,29 @@ class Scheduler:
                 f"{place.block.name} stepped from {place.t:.12g} towards {t:.12g} s and says that it is at "
                 f"{made.reached:.12g} s: that is outside the step."
             )
+        self._require_progress(place, made)
         place.t = made.reached
         if made.terminated:
             self.ended = place.block.name, made.reached, made.terminated
         return made
 
+    def _require_progress(self, place: _Place, made: Step) -> None:
+        """Refuse blocks that have one event after the other where they are."""
+        place.stalls = 0 if made.reached > place.t or made.terminated else place.stalls + 1
+        if place.stalls > ITERATIONS:
+            raise SchedulingError(
+                f"{place.block.name} gets no further than t = {place.t:.12g} s: each of its last {ITERATIONS} steps "
+                "ended there with an event."
+            )
+
     def _leave_event_mode(self, name: str) -> None:
         place = self._places[name]
         place.block.enter_step_mode()
         place.version += 1
+        predicts = place.next_event is not None and place.block.foresees
+        (self._unpredictable.discard if predicts else self._unpredictable.add)(name)
         if place.next_event is None:
-            self._unpredictable.add(name)
             return
-        self._unpredictable.discard(name)
         if place.next_event <= place.t:
             raise SchedulingError(
                 f"{name} is at t = {place.t:.12g} s and says that its next event is at {place.next_event:.12g} s: that "
@@ -233,7 +268,8 @@ class Scheduler:
             self._drop_obsolete()
         for name in sorted(due, key=lambda n: self._places[n].order):
             place = self._places[name]
-            if place.t < instant and not self.ended:
+            # What has stopped for an event is there; FMI allows no step before it is handled.
+            if place.t < instant and place not in stopped and not self.ended:
                 self._step(place, instant)
             if not self.ended:
                 place.block.enter_event_mode()
@@ -246,21 +282,22 @@ class Scheduler:
     def _watch_unpredictable(self, horizon: float) -> list[_Place]:
         """Step the blocks that cannot predict to the horizon; return those that stopped at an event.
 
-        Those that went beyond the first stop are restored and stepped again, to it.
+        Each is stepped to the first stop of those before it. Those that are beyond the last one's return there; what
+        cannot return stays ahead, for as long as nobody sends anything to it.
         """
         watched = [self._places[name] for name in self._unpredictable if self._places[name].t < horizon]
-        if not watched:
-            return []
-        watched.sort(key=lambda place: place.order)
-        saved = [(place, place.t, place.block.save()) for place in watched]
+        watched.sort(key=lambda place: (not place.block.can_restore, place.order))
+        # Nobody can be behind the one that is stepped last.
+        saved = [(place, place.t, place.block.save()) for place in watched[:-1] if place.block.can_restore]
         stopped: list[_Place] = []
+        first = horizon
         try:
             for place in watched:
-                if self._step(place, horizon).event:
+                if self._step(place, first).event:
                     stopped.append(place)
+                    first = min(first, place.t)
                 if self.ended:
                     return []
-            first = min((place.t for place in stopped), default=horizon)
             for place, t, state in saved:
                 if place.t > first + self._tolerance:
                     place.block.restore(state)
@@ -269,4 +306,7 @@ class Scheduler:
         finally:
             for place, _, state in saved:
                 place.block.release(state)
+        for place in stopped:
+            if place.t > first + self._tolerance and not place.block.can_restore:
+                heapq.heappush(self._queue, (place.t, place.order, place.version, place.block.name))
         return [place for place in stopped if place.t <= first + self._tolerance]

@@ -20,6 +20,9 @@ from hybrid_model.consensus.network import scenario_agents
 from hybrid_model.consensus.scenario import load_scenario
 from hybrid_model.consensus.scenario_data import Scenario
 
+MOST_SHOWN = 8
+"""Most times of events of one slave that are printed."""
+
 
 def add_parser(commands: Any) -> None:
     """Add the command to the command line."""
@@ -96,9 +99,18 @@ def _run(system: System, stop_time: float, options: argparse.Namespace) -> Cosim
     return run_event_exact(system, stop_time, output_interval=options.output_interval)
 
 
+def _events(slave: str, result: CosimResult) -> str:
+    times = [f"{t:.9g}" for t in result.event_times(slave)]
+    shown = ", ".join(times[:MOST_SHOWN])
+    more = f", ..., {times[-1]}" if len(times) > MOST_SHOWN else ""
+    return f"  {slave}: {len(times)} event{'s' * (len(times) != 1)} at {shown}{more} s"
+
+
 def _text(result: CosimResult) -> str:
     lines = [result.message or f"reached t = {result.t:.9g} s in {result.steps} steps"]
     clocks = sorted({(tick.slave, tick.clock) for tick in result.ticks})
     lines += [f"  {slave}.{clock}: {len(result.tick_times(slave, clock))} ticks" for slave, clock in clocks]
+    told = {slave for slave, _ in clocks}
+    lines += [_events(name, result) for name in sorted({event.block for event in result.events} - told)]
     lines += [f"  {name} = {value:.12g}" for name, value in result.final.items()]
     return "\n".join(lines)

@@ -24,7 +24,7 @@ class Exit(enum.IntEnum):
 
 def exit_of(stop: str) -> Exit:
     """Return the exit status for the name of the way a run ended (`hybrid_model.Stop`, `cosim.result.Ended`)."""
-    return {"HORIZON": Exit.DONE, "ZENO": Exit.ZENO}.get(stop, Exit.FAILED)
+    return {"HORIZON": Exit.DONE, "FINISHED": Exit.DONE, "ZENO": Exit.ZENO}.get(stop, Exit.FAILED)
 
 
 def progress(text: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from cosim.errors import CosimError, MisfitError
-from cosim.masters.start import outputs, require_times, sample, start_slaves
+from cosim.masters.start import outputs, require_times, sample, sample_end, start_slaves
 from cosim.result import CosimResult
 from cosim.system import System
 from hybrid_model.errors import SchedulingError
@@ -44,13 +44,15 @@ def run_event_exact(
     require_times(t_start, t_stop, output_interval, "output interval")
     _require_discrete(system)
     scheduler = Scheduler(system.slaves, system.from_slave, t_start)
-    result = CosimResult(t=t_start, ticks=scheduler.ticks)
+    result = CosimResult(t=t_start, ticks=scheduler.ticks, events=scheduler.events)
     try:
         start_slaves(system, t_start, t_stop, events=True)
         scheduler.handle_events(t_start, system.slaves)
         if output_interval is not None:
             sample(system, result, t_start, system.output_names)
         _advance(scheduler, system, result, t_stop, output_interval)
+        if scheduler.ended and output_interval is not None:
+            sample_end(system, result, scheduler.ended[1], system.output_names)
         result.final = outputs(system)
     except SchedulingError as error:
         raise CosimError(str(error)) from error

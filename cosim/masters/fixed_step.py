@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from cosim.errors import CosimError
-from cosim.masters.start import outputs, require_times, sample, start_slaves
+from cosim.masters.start import outputs, require_times, sample, sample_end, start_slaves
 from cosim.result import CosimResult
 from cosim.system import System
 
@@ -51,6 +51,7 @@ def run_fixed_step(
         for k in range(count):
             t_next = t_stop if k == count - 1 else t_start + (k + 1) * step
             if not _step_all(system, result, t_next):
+                sample_end(system, result, result.t, record)
                 break
             sample(system, result, t_next, record)
         result.final = outputs(system)

@@ -67,6 +67,12 @@ def sample(system: System, result: CosimResult, t: float, names: Sequence[str]) 
         result.signals.setdefault(name, []).append(system.get(name))
 
 
+def sample_end(system: System, result: CosimResult, t: float, names: Sequence[str]) -> None:
+    """Append the named outputs at `t`, where a slave ended the run, if it is news."""
+    if not result.times or result.times[-1] < t:
+        sample(system, result, t, names)
+
+
 def outputs(system: System) -> dict[str, float]:
     """Return all outputs by ``slave.output``."""
     return {name: system.get(name) for name in system.output_names}

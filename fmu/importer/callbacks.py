@@ -21,7 +21,8 @@ from fmpy.fmi2 import (
 
 from fmu.importer.memory import memory_functions
 
-_listeners: dict[int, Callable[[str], None]] = {}
+Listener = Callable[[int, str], None]
+_listeners: dict[int, Listener] = {}
 _environments = itertools.count(1)
 
 
@@ -31,7 +32,7 @@ class Callbacks:
     Parameters
     ----------
     listener : callable
-        Told the text of each message.
+        Told the status and the text of each message.
 
     Attributes
     ----------
@@ -39,7 +40,7 @@ class Callbacks:
         For fmpy's ``instantiate``.
     """
 
-    def __init__(self, listener: Callable[[str], None]) -> None:
+    def __init__(self, listener: Listener) -> None:
         self._environment = next(_environments)
         _listeners[self._environment] = listener
         allocate, free = memory_functions()
@@ -64,7 +65,7 @@ def _log(environment: int | None, name: bytes, status: int, category: bytes, mes
     if listener is None:  # of somebody else's instance, made by fmpy
         printLogMessage(environment, name, status, category, message)
     else:
-        listener((message or b"").decode("utf-8", "replace"))
+        listener(status, (message or b"").decode("utf-8", "replace"))
 
 
 _logger = fmi2CallbackLoggerTYPE(_log)
