@@ -17,7 +17,9 @@ _DESCRIPTION = """\
 Check an FMU of FMI 2.0 or 3.0: safety of the archive, schemas, fmpy's checks, semantic rules, exported symbols, and a
 short run of each interface type. The run executes the FMU's native code, in a child process with limits of time, memory
 and file size; these hold off crashes and hangs, not an attacker: give --no-run for an FMU that you do not trust.
-Exit status: 0 no error, 1 at least one error, 2 wrong usage."""
+Errors are what the standard forbids or importers suffer from; warnings are weakness against misuse (steps that are not
+a number, a wrong token), broken additions (sources, manifests of layered standards) and what fails on some machines;
+notes are good to know. Exit status: 0 no error, 1 at least one error (with --strict: or warning), 2 wrong usage."""
 
 
 def add_parser(commands: Any) -> None:
@@ -45,13 +47,13 @@ def run(options: argparse.Namespace) -> int:
     progress(f"checking {options.fmu}")
     limits = RunLimits(seconds=options.timeout, memory=options.memory << 20)
     report = check_fmu(options.fmu, run=not options.no_run, run_limits=limits)
-    print(json.dumps(report.as_dict(), indent=2) if options.json else as_text(report))
+    print(json.dumps(report.as_dict(), indent=2) if options.json else as_text(report, strict=options.strict))
     wrong = not report.ok or (options.strict and report.count(Severity.WARNING) > 0)
     return Exit.FAILED if wrong else Exit.DONE
 
 
-def as_text(report: Report) -> str:
-    """Return a report for people: findings by what was looked at, the worst first."""
+def as_text(report: Report, *, strict: bool = False) -> str:
+    """Return a report for people: findings by what was looked at, the worst first; where strict, warnings count."""
     title = f"{report.path}: FMI {report.fmi_version or 'unknown'}"
     lines = [", ".join([title, *report.kinds])]
     order = list(Severity)
@@ -65,5 +67,8 @@ def as_text(report: Report) -> str:
             lines += textwrap.wrap(text, 116, initial_indent=head, subsequent_indent=" " * len(head))
     counts = ", ".join(f"{report.count(severity)} {severity.value}s" for severity in Severity)
     ran = f"; run: {', '.join(report.executed)}" if report.executed else "; not run"
-    lines.append(f"\n{'sound' if report.ok else 'NOT SOUND'}: {counts}{ran}")
+    verdict = "sound" if report.ok else "NOT SOUND"
+    if strict and report.ok and report.count(Severity.WARNING):
+        verdict = "NOT SOUND by --strict"
+    lines.append(f"\n{verdict}: {counts}{ran}")
     return "\n".join(lines)

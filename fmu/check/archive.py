@@ -6,6 +6,7 @@ may use them too.
 
 from __future__ import annotations
 
+import operator
 import struct
 import zipfile
 import zlib
@@ -13,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from fmu.check.archive_rules import LIMITS, ArchiveLimits, is_folder, problems_of
+from fmu.check.archive_rules import LIMITS, ArchiveLimits, is_folder, name_of, problems_of, remarks_of
 
 BROKEN = (
     zipfile.BadZipFile,
@@ -55,6 +56,13 @@ class Archive:
         The FMU.
     limits : ArchiveLimits
 
+    Attributes
+    ----------
+    prefixed : bool
+        Whether bytes precede the archive.
+    remarks : tuple of tuple of str
+        Rule and sentence of what is wrong, but harmless here: backslashes, entries that are there twice and equal.
+
     Raises
     ------
     ArchiveError
@@ -67,14 +75,16 @@ class Archive:
         self._file: IO[bytes] = Path(path).open("rb")  # noqa: SIM115 - `__exit__` closes it
         try:
             self._zip = _opened(self._file)
-            problems = tuple(problems_of(self._zip, limits))
+            problems = tuple(problems_of(self._zip, limits)) or tuple(self._differences())
             if problems:
                 raise ArchiveError(problems)
+            self.remarks = tuple(remarks_of(self._zip))
         except BaseException:
             self._file.close()
             raise
         self.prefixed = bool(self._zip.infolist()) and min(m.header_offset for m in self._zip.infolist()) > 0
-        self._members = {member.filename: member for member in self._zip.infolist() if not is_folder(member)}
+        self._members = {name_of(member): member for member in self._zip.infolist() if not is_folder(member)}
+        self._folders = [name_of(member) for member in self._zip.infolist() if is_folder(member)]
 
     def __enter__(self) -> Archive:
         return self
@@ -100,27 +110,48 @@ class Archive:
         ArchiveError
             If its bytes are damaged.
         """
-        return b"".join(self._chunks(name))
+        return b"".join(self._chunks(self._members[name]))
 
     def extract(self, folder: Path) -> Path:
-        """Write all files below an existing folder, and return it.
+        """Write all files and folders, empty ones too, below an existing folder, and return it.
 
         Raises
         ------
         ArchiveError
             If the bytes of a file are damaged.
         """
-        for name in self._members:
+        for name in self._folders:
+            folder.joinpath(*name.removesuffix("/").split("/")).mkdir(parents=True, exist_ok=True)
+        for name, member in self._members.items():
             target = folder.joinpath(*name.split("/"))
             target.parent.mkdir(parents=True, exist_ok=True)
             with target.open("xb") as file:
-                for chunk in self._chunks(name):
+                for chunk in self._chunks(member):
                     file.write(chunk)
         return folder
 
-    def _chunks(self, name: str) -> Iterator[bytes]:
+    def _differences(self) -> Iterator[tuple[str, str]]:
+        """Yield the files that are there twice with different contents."""
+        first: dict[str, zipfile.ZipInfo] = {}
+        for member in self._zip.infolist():
+            name = name_of(member)
+            other = first.setdefault(name, member)
+            if other is member or is_folder(member):
+                continue
+            same = other.file_size == member.file_size and all(
+                map(operator.eq, self._chunks(other), self._chunks(member))
+            )
+            if not same:
+                yield (
+                    "duplicate",
+                    f"The member {name[:120]!r} is there twice with different contents, and readers differ in which "
+                    "one they take.",
+                )
+
+    def _chunks(self, info: zipfile.ZipInfo) -> Iterator[bytes]:
+        name = name_of(info)
         try:
-            with self._zip.open(self._members[name]) as member:
+            with self._zip.open(info) as member:
                 # zipfile stops at the announced size, which has been held against the limits, and checks the sum.
                 while chunk := member.read(_CHUNK):
                     yield chunk

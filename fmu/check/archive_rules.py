@@ -1,4 +1,7 @@
-"""Which archives must not be extracted, and why; judged by the directory of the archive alone."""
+"""Which archives must not be extracted, and why; judged by the directory of the archive alone.
+
+Names are read with '/' for each backslash: so they are judged, and so the files are extracted.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import itertools
 import stat
 import unicodedata
 import zipfile
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -57,7 +61,7 @@ def problems_of(archive: zipfile.ZipFile, limits: ArchiveLimits) -> Iterator[tup
         yield "size", f"The archive unpacks to {total} bytes; at most {limits.total_bytes} are accepted."
     yield from _clashes(members)
     yield from _overlaps(members)
-    if DESCRIPTION not in archive.NameToInfo:
+    if DESCRIPTION not in map(name_of, members):
         yield (
             "description",
             f"The archive has no {DESCRIPTION} at its top; every FMU has one: pack the folder's content.",
@@ -65,11 +69,9 @@ def problems_of(archive: zipfile.ZipFile, limits: ArchiveLimits) -> Iterator[tup
 
 
 def _name_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[tuple[str, str]]:
-    name = member.orig_filename  # `filename` is cut at a NUL and has the separators of this system
-    shown = repr(name[:120])
+    shown = repr(member.orig_filename[:120])
+    name = member.orig_filename.replace("\\", "/")  # `filename` is cut at a NUL and has the separators of this system
     parts = name.removesuffix("/").split("/")
-    if "\\" in name:
-        yield "backslash", f"The member {shown} has a backslash; ZIP separates folders by '/'."
     if name.startswith("/"):
         yield "absolute", f"The member {shown} is an absolute path; an FMU stays within its folder."
     elif "" in parts or "." in parts:
@@ -112,28 +114,49 @@ def _member_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator
         )
 
 
+def name_of(member: zipfile.ZipInfo) -> str:
+    """Return the name of a member with '/' between folders."""
+    return member.filename.replace("\\", "/")
+
+
 def is_folder(member: zipfile.ZipInfo) -> bool:
     """Tell whether a member is a folder."""
-    return member.filename.endswith("/")  # `ZipInfo.is_dir` fails on an empty name
+    return name_of(member).endswith("/")  # `ZipInfo.is_dir` fails on an empty name
+
+
+def remarks_of(archive: zipfile.ZipFile) -> Iterator[tuple[str, str]]:
+    """Yield the rule and the sentence of what strict readers refuse, and no reader can take for another file."""
+    members = archive.infolist()
+    wrong = [member.orig_filename for member in members if "\\" in member.orig_filename]
+    if wrong:
+        yield (
+            "backslash",
+            f"{_some(wrong)} a backslash between folders, where ZIP has '/': other systems take it for a part of the "
+            "name. Pack the FMU anew.",
+        )
+    twice = [name for name, times in Counter(map(name_of, members)).items() if times > 1]
+    if twice:
+        yield "duplicate", f"{_some(twice)} an entry twice, of equal content: strict readers refuse that."
+
+
+def _some(names: list[str]) -> str:
+    one, count = repr(names[0][:120]), len(names)
+    return f"The member {one} has" if count == 1 else f"The member {one} and {count - 1} more have"
 
 
 def _clashes(members: list[zipfile.ZipInfo]) -> Iterator[tuple[str, str]]:
-    exact: set[str] = set()
     folded: dict[str, str] = {}
     files: set[str] = set()
     folders: set[str] = set()
     for member in members:
-        name = member.filename.removesuffix("/")
+        name = name_of(member).removesuffix("/")
         key = unicodedata.normalize("NFC", name).casefold()
-        if name in exact:
-            yield "duplicate", f"The member {name[:120]!r} is there twice, and readers differ in which one they take."
-        elif key in folded:
+        if folded.get(key, name) != name:
             yield (
                 "case",
                 f"The members {folded[key][:120]!r} and {name[:120]!r} are one file on systems that ignore "
                 "case: rename one.",
             )
-        exact.add(name)
         folded.setdefault(key, name)
         parts = key.split("/")
         if len(parts) <= 64:

@@ -30,22 +30,31 @@ sys.exit(main(sys.argv[2]))
 
 @dataclass(frozen=True)
 class RunLimits:
-    """Limits of one child process: time in s of the clock and the processor, memory and largest file in bytes."""
+    """Limits of one child process.
+
+    Attributes
+    ----------
+    seconds : float
+        Time of the clock and of the processor, in s.
+    bad_step_seconds : float
+        Time for one step that no importer sends, in s.
+    memory, file_bytes : int
+        Memory and largest file, in bytes.
+    """
 
     seconds: float = 20.0
+    bad_step_seconds: float = 2.0
     memory: int = 2 << 30
     file_bytes: int = 64 << 20
 
 
-def run_experiment(plan: dict[str, Any], where: str, limits: RunLimits) -> Iterator[Finding]:
+def run_experiment(plan: dict[str, Any], limits: RunLimits) -> Iterator[Finding]:
     """Make the experiment of a plan, and yield what it finds and how its process ends.
 
     Parameters
     ----------
     plan : dict
         From `fmu.check.plan.plan_of`, with the name of the experiment.
-    where : str
-        Name of the experiment in messages.
     limits : RunLimits
     """
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-", ignore_cleanup_errors=True) as name:
@@ -54,7 +63,12 @@ def run_experiment(plan: dict[str, Any], where: str, limits: RunLimits) -> Itera
         place.write_bytes(bytes(PLACE_BYTES))
         findings.touch()
         work.mkdir()
-        bounds = {"memory": limits.memory, "cpu": math.ceil(limits.seconds) + 1, "file_bytes": limits.file_bytes}
+        bounds = {
+            "memory": limits.memory,
+            "cpu": math.ceil(limits.seconds) + 1,
+            "file_bytes": limits.file_bytes,
+            "bad_step_seconds": min(limits.seconds, limits.bad_step_seconds),
+        }
         plan = {**plan, **bounds, "place": str(place), "findings": str(findings)}
         (folder / "plan.json").write_text(json.dumps(plan), encoding="utf-8")
         status = _run(folder, work, limits)
@@ -63,22 +77,17 @@ def run_experiment(plan: dict[str, Any], where: str, limits: RunLimits) -> Itera
         at = place.read_bytes().rstrip(b"\0").decode("utf-8", "replace")
         for line in lines:
             if not line.get("done"):
-                message = f"{where}: {line.get('message', '')}"
-                yield Finding(
-                    Severity(line["severity"]), str(line["rule"]), message, line.get("reference") or LIFE_CYCLE
-                )
-        yield from _ending(status, done, at, where, limits, _tail(folder / "stderr"))
+                kind, message = Severity(line["severity"]), str(line.get("message", ""))
+                yield Finding(kind, str(line["rule"]), message, line.get("reference") or LIFE_CYCLE)
+        yield from _ending(status, done, at, limits, _tail(folder / "stderr"))
         printed = _tail(folder / "stdout")
         if printed:
             yield warning(
-                "run.stdout",
-                f"{where}: it prints to stdout, which is the host's: {quoted(printed)}. Log by the callback.",
+                "run.stdout", f"It prints to stdout, which is the host's: {quoted(printed)}. Log by the callback."
             )
         left = sorted(path.name for path in work.iterdir())
         if left:
-            yield warning(
-                "run.files", f"{where}: it leaves {quoted(left[0])} in the working folder, which is the host's."
-            )
+            yield warning("run.files", f"It leaves {quoted(left[0])} in the working folder, which is the host's.")
 
 
 def _run(folder: Path, work: Path, limits: RunLimits) -> int | None:
@@ -122,27 +131,27 @@ def _tail(path: Path, limit: int = 2000) -> str:
         return file.read(limit).decode("utf-8", "replace").strip()
 
 
-def _ending(status: int | None, done: bool, at: str, where: str, limits: RunLimits, said: str) -> Iterator[Finding]:
+def _ending(status: int | None, done: bool, at: str, limits: RunLimits, said: str) -> Iterator[Finding]:
     times_up = hasattr(signal, "SIGXCPU") and status == -signal.SIGXCPU
-    if status is None or times_up:
+    step_over = hasattr(signal, "SIGALRM") and status == -signal.SIGALRM
+    last = f" It last printed {quoted(said[-300:], 300)} to stderr." if said else ""
+    if status is None or times_up or step_over:
+        seconds = limits.bad_step_seconds if step_over else limits.seconds
         yield error(
             "run.hang",
-            f"{where}: it hangs in {at}: no answer within {limits.seconds:g} s. Each call must end.",
+            f"It hangs in {at}: no answer within {min(seconds, limits.seconds):g} s. Each call must end.{last}",
             LIFE_CYCLE,
         )
     elif status < 0:
         name = next((known.name for known in signal.Signals if known == -status), f"signal {-status}")
         yield error(
             "run.crash",
-            f"{where}: it crashes with {name} in {at} (limit of memory: {limits.memory >> 20} MiB).",
+            f"It crashes with {name} in {at} (limit of memory: {limits.memory >> 20} MiB).{last}",
             LIFE_CYCLE,
         )
     elif status != 0 or not done:
-        last = f": {quoted(said[-300:], 300)}" if said else ""
         yield error(
-            "run.exit",
-            f"{where}: the process ends with status {status} in {at}{last}. An FMU must not exit.",
-            LIFE_CYCLE,
+            "run.exit", f"The process ends with status {status} in {at}. An FMU must not exit.{last}", LIFE_CYCLE
         )
     elif said:
-        yield note("run.stderr", f"{where}: it prints to stderr: {quoted(said)}.")
+        yield note("run.stderr", f"It prints to stderr: {quoted(said)}.")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from fmu.check.binary import Binary, BinaryError, Bytes, bounded, first
 
-_MACHINES = {3: "i686", 40: "aarch32", 62: "x86_64", 183: "aarch64", 243: "riscv64", 21: "ppc64"}
+_MACHINES = {3: "x86", 20: "ppc32", 21: "ppc64", 40: "aarch32", 62: "x86_64", 183: "aarch64", 243: "riscv"}
 _LOAD, _DYNAMIC, _GNU_STACK = 1, 2, 0x6474E551
 _NEEDED, _HASH, _STRTAB, _SYMTAB, _RPATH, _TEXTREL, _RUNPATH, _FLAGS = 1, 4, 5, 6, 15, 22, 29, 30
 _GNU_HASH = 0x6FFFFEF5
@@ -41,13 +41,18 @@ def read(content: bytes) -> Binary:
         flaws.append("execstack")
     return Binary(
         system="linux",
-        machines=frozenset({_MACHINES.get(machine, f"machine {machine}")}),
+        machines=frozenset({_architecture(machine, wide)}),
         exports=frozenset(exports) - _LINKER,
         imports=frozenset(imports),
         needed=named[_NEEDED],
         rpaths=tuple(folder for text in (*named[_RPATH], *named[_RUNPATH]) for folder in text.split(":")),
         flaws=tuple(flaws),
     )
+
+
+def _architecture(machine: int, wide: bool) -> str:
+    name = _MACHINES.get(machine, f"machine {machine}")
+    return f"riscv{64 if wide else 32}" if name == "riscv" else name
 
 
 def _segments(data: Bytes, wide: bool) -> Iterator[tuple[int, int, int, int, int]]:

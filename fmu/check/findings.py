@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 
@@ -12,9 +12,9 @@ class Severity(enum.Enum):
     """How much a finding matters."""
 
     ERROR = "error"
-    """A rule of the standard is broken, or an importer is harmed."""
+    """A rule of the standard is broken, or importers are harmed: only errors decide the verdict."""
     WARNING = "warning"
-    """Legal or not ruled, but known to fail with some importer."""
+    """Weak against misuse, an addition that is broken, or known to fail with some importer or machine."""
     NOTE = "note"
     """Good to know: what was left out, or what a machine needs."""
 
@@ -58,6 +58,11 @@ def warning(rule: str, message: str, reference: str = "") -> Finding:
 def note(rule: str, message: str, reference: str = "") -> Finding:
     """Return a finding that only informs."""
     return Finding(Severity.NOTE, rule, _printable(message), reference)
+
+
+def softened(finding: Finding) -> Finding:
+    """Return an error as a warning; other findings as they are."""
+    return replace(finding, severity=Severity.WARNING) if finding.severity is Severity.ERROR else finding
 
 
 def _printable(text: str) -> str:

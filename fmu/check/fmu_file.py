@@ -12,7 +12,7 @@ from fmu.check.archive import Archive, ArchiveError
 from fmu.check.archive_rules import DESCRIPTION, LIMITS, ArchiveLimits
 from fmu.check.child_process import RunLimits
 from fmu.check.description import Description, read_description
-from fmu.check.findings import Finding, Report, error, note, quoted
+from fmu.check.findings import Finding, Report, error, note, quoted, warning
 from fmu.check.fmpy_findings import fmpy_findings
 from fmu.check.rules_binaries import binary_findings
 from fmu.check.rules_files import file_findings
@@ -21,10 +21,11 @@ from fmu.check.rules_structure import structure_findings
 from fmu.check.rules_units import unit_findings
 from fmu.check.rules_variables import variable_findings
 from fmu.check.smoke import run_fmu
-from fmu.check.xml_file import XmlError, parse, require_size, schema_findings
+from fmu.check.xml_file import XmlError, as_utf8, parse, require_size, schema_findings
 from fmu.importer.unpacking import unpack
 
 SAFETY = "FMI 3.0.2 section 2.5: ZIP with store or deflate, no encryption, '/' between folders"
+_REMARKS = {"backslash": error, "duplicate": warning}
 _SCHEMAS = {2: "fmi2/fmi2ModelDescription.xsd", 3: "fmi3/fmi3ModelDescription.xsd"}
 
 
@@ -61,6 +62,7 @@ def check_fmu(
         report.extend([error("archive.suffix", f"The file {quoted(Path(path).name)} must end in .fmu.", SAFETY)])
     try:
         with Archive(path, archive_limits) as archive:
+            report.extend(_REMARKS[rule](f"archive.{rule}", sentence, SAFETY) for rule, sentence in archive.remarks)
             _check(archive, report, run_limits or RunLimits() if run else None)
     except ArchiveError as refused:
         report.extend(error(f"archive.{rule}", sentence, SAFETY) for rule, sentence in refused.problems)
@@ -70,7 +72,8 @@ def check_fmu(
 def _check(archive: Archive, report: Report, run_limits: RunLimits | None) -> None:
     try:
         require_size(archive.size(DESCRIPTION), DESCRIPTION)
-        content = archive.read(DESCRIPTION)
+        content, coding = as_utf8(archive.read(DESCRIPTION), DESCRIPTION)
+        report.extend(coding)
         root = parse(content, DESCRIPTION)
     except XmlError as refused:
         report.extend([refused.finding])
@@ -110,7 +113,12 @@ def _major(root: etree._Element, report: Report) -> int | None:
     for major in _SCHEMAS:
         if version.startswith(f"{major}."):
             return major
-    report.extend([error("xml.version", f"FMI {quoted(version)} is not known here: 2.0 and 3.0 are checked.")])
+    text = (
+        "of FMI 1.0, which is not supported"
+        if version.startswith("1.")
+        else f"of FMI {quoted(version)}, not known here"
+    )
+    report.extend([error("xml.version", f"The FMU is {text}: FMUs of FMI 2.0 and 3.0 are checked.")])
     return None
 
 

@@ -8,7 +8,7 @@ from fmu.check.binary import Binary, BinaryError, Bytes, bounded
 
 MAGICS = (b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe")
 _FAT = MAGICS[2]
-_MACHINES = {7: "i686", 0x01000007: "x86_64", 12: "aarch32", 0x0100000C: "aarch64"}
+_MACHINES = {7: "x86", 0x01000007: "x86_64", 12: "aarch32", 0x0100000C: "aarch64"}
 _DYLIB, _BUNDLE = 6, 8
 _SYMTAB, _LOAD_DYLIB, _RPATH, _DYLD_INFO, _EXPORTS_TRIE = 0x2, 0xC, 0x1C, 0x22, 0x33
 _REQUIRED = 0x80000000

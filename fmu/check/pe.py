@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from fmu.check.binary import Binary, BinaryError, Bytes, bounded
 
-_MACHINES = {0x14C: "i686", 0x8664: "x86_64", 0x1C4: "aarch32", 0xAA64: "aarch64"}
+_MACHINES = {0x14C: "x86", 0x8664: "x86_64", 0x1C4: "aarch32", 0xAA64: "aarch64"}
 _DLL = 0x2000
 
 

@@ -69,8 +69,7 @@ def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> 
         "stop": stop,
         "step": step,
         "points": points,
-        # Short enough for stiff models to stay finite over the few steps.
-        "euler_step": (stop - start) / 1000.0,
+        "longest_step": (stop - start) / 1000.0,
     }
 
 

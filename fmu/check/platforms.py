@@ -8,20 +8,25 @@ import sys
 
 EXTENSIONS = {"linux": ".so", "windows": ".dll", "darwin": ".dylib"}
 FMI2 = {
-    "linux32": ("i686", "linux"),
+    "linux32": ("x86", "linux"),
     "linux64": ("x86_64", "linux"),
-    "win32": ("i686", "windows"),
+    "win32": ("x86", "windows"),
     "win64": ("x86_64", "windows"),
+    "darwin32": ("x86", "darwin"),
     "darwin64": ("x86_64", "darwin"),
 }
-_TUPLE = re.compile(r"(aarch32|aarch64|i386|i586|i686|x86_64|riscv32|riscv64|ppc32|ppc64)-(darwin|linux|windows)(-.+)?")
+_TUPLE = re.compile(
+    r"(aarch32|aarch64|riscv32|riscv64|x86|x86_64|ppc32|ppc64)-(darwin|linux|windows)(-[a-z][a-z0-9_]*)?"
+)
+"""Platform tuples of FMI 3.0.2, section 2.5.1, with the binary interface of static libraries."""
 _MACHINES = {
     "amd64": "x86_64",
     "x86_64": "x86_64",
     "arm64": "aarch64",
     "aarch64": "aarch64",
-    "i386": "i686",
-    "i686": "i686",
+    "i386": "x86",
+    "i686": "x86",
+    "x86": "x86",
 }
 
 
@@ -50,7 +55,7 @@ def this_machine() -> tuple[str, str]:
     machine = platform.machine().lower()
     known = _MACHINES.get(machine, machine)
     if sys.maxsize < 2**32 and known == "x86_64":
-        known = "i686"
+        known = "x86"
     return known, systems.get(sys.platform, sys.platform)
 
 

@@ -110,8 +110,7 @@ def _has_name_in_fmi2(platform: tuple[str, str, str]) -> bool:
 
 
 def _library(name: str, binary: Binary, machine: str, system: str) -> Iterator[Finding]:
-    family = {"i386": "i686", "i586": "i686"}.get(machine, machine)
-    if binary.system != system or family not in binary.machines:
+    if binary.system != system or machine not in binary.machines:
         found = f"{', '.join(sorted(binary.machines))}-{binary.system}"
         yield error("binary.machine", f"{name} is built for {found}: put it into the folder of its platform.", PLACES)
     # $ORIGIN is what the standard asks of an FMU that brings further libraries.

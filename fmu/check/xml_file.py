@@ -1,8 +1,9 @@
 """XML of strangers: refused before it can do harm, then parsed and held against the standard's schemas.
 
-The bytes pass expat first, which builds nothing: it stops at a DOCTYPE, at too much depth and at too many elements.
-Only then lxml builds a tree, with neither entities nor network.  lxml (libxml2) is chosen for the schemas since fmpy
-brings it along, it reads both versions' schemas, and a description of 60 MB takes it seconds, not minutes.
+What is not UTF-8 is first written in UTF-8.  The bytes then pass expat, which builds nothing: it stops at a DOCTYPE, at
+too much depth and at too many elements.  Only then lxml builds a tree, with neither entities nor network.  lxml
+(libxml2) is chosen for the schemas since fmpy brings it along, it reads both versions' schemas, and a description of
+60 MB takes it seconds, not minutes.
 """
 
 from __future__ import annotations
@@ -31,6 +32,9 @@ class XmlLimits:
 
 
 LIMITS = XmlLimits()
+_DECLARATION = re.compile(rb"(\xef\xbb\xbf)?<\?xml[^>]{0,200}?encoding\s{0,9}=\s{0,9}[\"']([A-Za-z0-9._-]+)")
+_ENCODING = re.compile(r"^(\ufeff?<\?xml[^>]{0,200}?encoding\s{0,9}=\s{0,9}[\"'])[A-Za-z0-9._-]+([\"'])")
+_READABLE = re.compile(r"(us-)?ascii|iso-8859-\d{1,2}|latin-?1|windows-125\d|cp125\d|utf-16", re.IGNORECASE)
 
 
 class XmlError(ValueError):
@@ -89,6 +93,52 @@ def parse(content: bytes, name: str, limits: XmlLimits = LIMITS) -> etree._Eleme
     return root
 
 
+def as_utf8(content: bytes, name: str) -> tuple[bytes, list[Finding]]:
+    """Return an XML file in UTF-8, and the finding that it is not, so that the rest of it can be looked at.
+
+    Only codings whose characters below 128 are those of ASCII, and UTF-16 with its mark, are read.
+
+    Parameters
+    ----------
+    content : bytes
+        The file.
+    name : str
+        Its name, for messages.
+
+    Returns
+    -------
+    bytes
+    list of Finding
+
+    Raises
+    ------
+    XmlError
+        If the file is in a coding that is not read, or not in the one it says.
+    """
+    declared = _DECLARATION.match(content)
+    said = declared[2].decode() if declared else ""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        coding, why = "utf-16", "it begins with the mark of UTF-16"
+    elif said and said.lower() not in ("utf-8", "utf8"):
+        coding, why = said, f"it says its encoding is {said}"
+    else:
+        try:
+            content.decode("utf-8")
+        except UnicodeDecodeError as problem:
+            coding, why = "windows-1252", f"byte {problem.start} does not belong to it"
+        else:
+            return content, []
+    try:
+        if not _READABLE.fullmatch(coding):
+            raise LookupError(coding)
+        text = content.decode(coding, "strict" if coding == said else "replace")
+    except (LookupError, UnicodeDecodeError) as problem:
+        raise _refused("encoding", f"{name} is not UTF-8: {why}. FMI asks for UTF-8: write it in UTF-8.") from problem
+    unsaid = _ENCODING.sub(r"\1UTF-8\2", text, count=1)
+    message = f"{name} is not UTF-8: {why}. FMI asks for UTF-8: write it in UTF-8 (it was read as {coding})."
+    return unsaid.encode("utf-8", "replace"), [error("xml.encoding", message, STANDARD)]
+
+
 def require_size(size: int, name: str, limits: XmlLimits = LIMITS) -> None:
     """Refuse an XML file by its size in bytes, best before it is read.
 
@@ -116,10 +166,10 @@ def _require_utf8(content: bytes, name: str) -> None:
         raise _refused(
             "encoding", f"{name} is not UTF-8 at byte {problem.start}; FMI asks for UTF-8: write it in UTF-8."
         ) from problem
-    declared = re.match(rb"(?:\xef\xbb\xbf)?<\?xml[^>]*?encoding\s*=\s*[\"']([A-Za-z0-9._-]+)", content[:400])
-    if declared and declared[1].lower() not in (b"utf-8", b"utf8"):
+    declared = _DECLARATION.match(content)
+    if declared and declared[2].lower() not in (b"utf-8", b"utf8"):
         raise _refused(
-            "encoding", f"{name} says its encoding is {declared[1].decode()}; FMI asks for UTF-8: write it in UTF-8."
+            "encoding", f"{name} says its encoding is {declared[2].decode()}; FMI asks for UTF-8: write it in UTF-8."
         )
 
 

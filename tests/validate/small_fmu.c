@@ -20,11 +20,19 @@
 #endif
 
 typedef struct {
-    double t, x, rate, u, memory;
-    int calls, reads, initializing;
+    double t, x, rate, u, memory, stop;
+    int calls, reads, initializing, resets;
 } State;
 
-static State* make(const char* token) {
+#ifndef STIFFNESS
+#define STIFFNESS 1.0
+#endif
+
+static State* make(const char* token, const char* resources) {
+#ifdef FAULT_RESOURCES
+    if (strstr(resources, "resources") == NULL) return NULL;
+#endif
+    (void)resources;
 #ifndef FAULT_TOKEN
     if (strcmp(token, TOKEN) != 0) return NULL;
 #else
@@ -35,7 +43,8 @@ static State* make(const char* token) {
 #endif
     State* s = calloc(1, sizeof *s);
     s->x = 1.0;
-    s->rate = 1.0;
+    s->rate = STIFFNESS;
+    s->stop = INFINITY;
 #ifdef FAULT_STDOUT
     printf("hello from the solver\n");
     fflush(stdout);
@@ -95,10 +104,16 @@ static int set(State* s, unsigned reference, double value) {
 
 static int step(State* s, double t, double h) {
 #ifdef FAULT_CRASH
-    if (s->t > 0.3) *(volatile int*)8 = 1;
+    if (s->t > 0.3) {
+        fprintf(stderr, "the solver lost its way\n");
+        *(volatile int*)8 = 1;
+    }
 #endif
 #ifdef FAULT_ABORT
     if (s->t > 0.3) abort();
+#endif
+#ifdef FAULT_STOP
+    if (t + h > s->stop) return ERROR;
 #endif
 #ifdef FAULT_HANG
     /* The loop of a solver that asks `t < end` the other way round never ends on NaN. */
@@ -126,8 +141,9 @@ static void reset(State* s) {
     s->calls = s->reads = 0;
 #endif
     s->x = 1.0;
-    s->rate = 1.0;
+    s->rate = STIFFNESS;
     s->u = 0.0;
+    s->resets++;
 }
 
 static int copy(State* s, void** out) {
@@ -171,11 +187,17 @@ API void* fmi3Unused(void) { Py_Initialize(); return PyLong_FromLong(1); }
 
 #if FMI == 3
 API const char* fmi3GetVersion(void) { return "3.0"; }
-API void* fmi3InstantiateCoSimulation(const char* name, const char* token) { (void)name; return make(token); }
-API void* fmi3InstantiateModelExchange(const char* name, const char* token) { (void)name; return make(token); }
-API void* fmi3InstantiateScheduledExecution(const char* name, const char* token) { (void)name; return make(token); }
+API void* fmi3InstantiateCoSimulation(const char* name, const char* token, const char* place) { (void)name; return make(token, place); }
+API void* fmi3InstantiateModelExchange(const char* name, const char* token, const char* place) { (void)name; return make(token, place); }
+API void* fmi3InstantiateScheduledExecution(const char* name, const char* token, const char* place) { (void)name; return make(token, place); }
 API void fmi3FreeInstance(State* s) { free(s); }
-API int fmi3EnterInitializationMode(State* s, bool d, double tol, double start) { s->initializing = 1; (void)d; (void)tol; s->t = start; return OK; }
+API int fmi3EnterInitializationMode(State* s, bool d, double tol, double start, bool limited, double stop) {
+    (void)d; (void)tol;
+    s->initializing = 1;
+    s->t = start;
+    if (limited) s->stop = stop;
+    return OK;
+}
 API int fmi3ExitInitializationMode(State* s) { s->initializing = 0; return OK; }
 API int fmi3EnterEventMode(State* s) { (void)s; return OK; }
 API int fmi3EnterStepMode(State* s) {
@@ -225,6 +247,9 @@ API int fmi3DoStep(State* s, double t, double h, bool no, bool* event, bool* end
     *last = s->t;
 #ifdef FAULT_LAST_TIME
     *last = t + h / 2.0;
+#endif
+#ifdef FAULT_RESET_ENDS
+    *end = s->resets > 0;
 #endif
 #ifdef FAULT_MANY
     *early = true;
@@ -330,9 +355,17 @@ API int fmi3ActivateModelPartition(State* s, uint32_t clock, double t) { (void)c
 #else
 API const char* fmi2GetVersion(void) { return "2.0"; }
 API const char* fmi2GetTypesPlatform(void) { return "default"; }
-API void* fmi2Instantiate(const char* name, int kind, const char* token) { (void)name; (void)kind; return make(token); }
+API void* fmi2Instantiate(const char* name, int kind, const char* token, const char* place) {
+    (void)name; (void)kind;
+    return make(token, place);
+}
 API void fmi2FreeInstance(State* s) { free(s); }
-API int fmi2SetupExperiment(State* s, int d, double tol, double start) { (void)d; (void)tol; s->t = start; return OK; }
+API int fmi2SetupExperiment(State* s, int d, double tol, double start, int limited, double stop) {
+    (void)d; (void)tol;
+    s->t = start;
+    if (limited) s->stop = stop;
+    return OK;
+}
 API int fmi2EnterInitializationMode(State* s) { s->initializing = 1; return OK; }
 API int fmi2ExitInitializationMode(State* s) { s->initializing = 0; return OK; }
 API int fmi2EnterEventMode(State* s) { (void)s; return OK; }

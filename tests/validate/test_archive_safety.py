@@ -12,6 +12,7 @@ from small_fmus import DESCRIPTIONS
 
 from fmu.check.archive import Archive, ArchiveError, extract_fmu
 from fmu.check.archive_rules import ArchiveLimits
+from fmu.check.findings import Severity
 from fmu.check.fmu_file import check_fmu
 
 DESCRIPTION = ("modelDescription.xml", DESCRIPTIONS[3].encode())
@@ -62,8 +63,10 @@ def link(name, target="/etc/passwd", kind=stat.S_IFLNK):
         ("//server/share", "absolute"),
         ("C:/evil.txt", "drive"),
         ("resources/data.txt:stream", "drive"),
-        ("resources\\data.txt", "backslash"),
-        ("..\\evil.txt", "backslash"),
+        ("..\\evil.txt", "traversal"),
+        ("\\evil.txt", "absolute"),
+        ("resources\\..\\..\\evil.txt", "traversal"),
+        ("resources\\NUL.txt", "reserved"),
         ("resources/./data.txt", "path"),
         ("resources//data.txt", "path"),
         ("", "path"),
@@ -107,10 +110,44 @@ def test_links_and_special_files(kind, tmp_path):
         ("resources/straße", "resources/STRASSE", "case"),
         ("resources/\u00e9", "resources/e\u0301", "case"),
         ("resources/a", "resources/a/b", "duplicate"),
+        ("resources/a", "resources\\a", "duplicate"),
+        ("resources\\a", "resources/A", "case"),
     ],
 )
 def test_two_members_for_one_file(first, second, rule, tmp_path):
     assert rule in rules(pack(tmp_path / "a.fmu", DESCRIPTION, (first, b"1"), (second or first, b"2")))
+
+
+def test_backslashes_are_said_and_read_as_folders(tmp_path):
+    path = pack(tmp_path / "a.fmu", DESCRIPTION, ("resources\\data.txt", b"data"), ("resources\\empty\\", b""))
+    target = tmp_path / "target"
+    target.mkdir()
+    extract_fmu(path, target)
+    assert (target / "resources" / "data.txt").read_bytes() == b"data"
+    assert (target / "resources" / "empty").is_dir()
+    [finding] = [f for f in check_fmu(path, run=False).findings if f.group == "archive"]
+    assert finding.rule == "archive.backslash"
+    assert finding.severity is Severity.ERROR
+    assert "and 1 more have a backslash" in finding.message
+
+
+def test_equal_entries_that_are_there_twice_are_a_warning(tmp_path):
+    twice = [("resources/", b""), ("resources/data.txt", b"data")] * 2
+    path = pack(tmp_path / "a.fmu", DESCRIPTION, *twice)
+    target = tmp_path / "target"
+    target.mkdir()
+    extract_fmu(path, target)
+    assert (target / "resources" / "data.txt").read_bytes() == b"data"
+    [finding] = [f for f in check_fmu(path, run=False).findings if f.group == "archive"]
+    assert (finding.rule, finding.severity) == ("archive.duplicate", Severity.WARNING)
+    assert rules(pack(tmp_path / "b.fmu", DESCRIPTION, *twice, ("resources/data.txt", b"DATA"))) == {"duplicate"}
+
+
+def test_empty_folders_are_extracted(tmp_path):
+    target = tmp_path / "target"
+    target.mkdir()
+    extract_fmu(pack(tmp_path / "a.fmu", DESCRIPTION, ("resources/", b"")), target)
+    assert (target / "resources").is_dir()
 
 
 def test_bombs_by_ratio_and_by_size(tmp_path):

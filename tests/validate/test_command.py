@@ -37,14 +37,14 @@ def test_a_fault_is_status_1_and_is_grouped(tmp_path, capsys):
 
 
 def test_json_for_machines(tmp_path, capsys):
-    path = write(tmp_path / "small.fmu", members(3, "TOKEN"))
+    path = write(tmp_path / "small.fmu", members(3, "UNREADABLE"))
     status, printed = run(capsys, path, "--json")
     report = json.loads(printed)
     assert status == 1
     assert report["file"] == str(path)
     assert (report["ok"], report["fmi_version"], report["errors"]) == (False, "3.0", 2)
     assert sorted(report["kinds"]) == sorted(report["executed"]) == ["CoSimulation", "ModelExchange"]
-    assert {f["rule"] for f in report["findings"]} == {"run.token"}
+    assert {f["rule"] for f in report["findings"]} == {"run.refused"}
     assert all(f.keys() == {"severity", "rule", "message", "reference"} for f in report["findings"])
 
 
@@ -52,6 +52,17 @@ def test_no_run_executes_nothing(tmp_path, capsys):
     path = write(tmp_path / "small.fmu", members(3, "CRASH"))
     assert run(capsys, path, "--no-run")[0] == 0
     assert json.loads(run(capsys, path, "--no-run", "--json")[1])["executed"] == []
+
+
+def test_what_no_importer_does_decides_no_verdict(tmp_path, capsys):
+    """A wrong token is taken, a negative step done: warnings, which only --strict counts."""
+    path = write(tmp_path / "small.fmu", members(3, "TOKEN", "ANY_STEP", description=PLAIN))
+    status, printed = run(capsys, path)
+    assert status == 0
+    assert "\nsound: 0 errors, 3 warnings" in printed
+    status, printed = run(capsys, path, "--strict")
+    assert status == 1
+    assert "\nNOT SOUND by --strict: 0 errors, 3 warnings" in printed
 
 
 def test_strict_counts_warnings(tmp_path, capsys):
@@ -62,7 +73,7 @@ def test_strict_counts_warnings(tmp_path, capsys):
 
 def test_a_time_limit_is_obeyed(tmp_path, capsys):
     path = write(tmp_path / "small.fmu", members(3, "HANG", description=PLAIN))
-    status, printed = run(capsys, path, "--timeout", "4")
+    status, printed = run(capsys, path, "--timeout", "4", "--strict")
     assert status == 1
     assert "hangs in fmi3DoStep(0.0, nan)" in " ".join(printed.split())
 

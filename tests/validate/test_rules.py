@@ -6,6 +6,7 @@ from small_fmus import DESCRIPTIONS, EXTENSION, FOLDERS, MACHINE, SCHEDULED, bin
 
 from fmu.check.findings import LIMIT, Severity
 from fmu.check.fmu_file import check_fmu
+from fmu.check.platforms import parts_of
 
 X3 = '<Float64 name="x" valueReference="1" initial="exact" start="1" unit="m" min="-10" max="10"/>'
 DER3 = '<Float64 name="der(x)" valueReference="2" derivative="1"/>'
@@ -226,6 +227,30 @@ def test_build_descriptions(fields, rules, tmp_path):
     assert wrong(check(tmp_path, DESCRIPTIONS[3], files)) == rules
 
 
+def test_missing_sources_are_told_in_one_sentence(tmp_path):
+    """Beside a binary they are a warning; an FMU of sources alone cannot be used without them."""
+    files = "".join(f'<SourceFile name="part{n}.c"/>' for n in range(21))
+    configuration = (
+        f'<BuildConfiguration modelIdentifier="small"><SourceFileSet>{files}</SourceFileSet></BuildConfiguration>'
+    )
+    text = f'<fmiBuildDescription fmiVersion="3.0">{configuration * 2}</fmiBuildDescription>'
+    extra = {"sources/buildDescription.xml": text}
+    [finding] = [f for f in check(tmp_path, DESCRIPTIONS[3], extra).findings if f.rule == "source.missing"]
+    assert finding.severity is Severity.WARNING
+    assert "'part0.c', 'part1.c'" in finding.message
+    assert "(21 in all)" in finding.message
+    alone = check_fmu(write(tmp_path / "b.fmu", {"modelDescription.xml": DESCRIPTIONS[3], **extra}), run=False)
+    assert [f.severity for f in alone.findings if f.rule == "source.missing"] == [Severity.ERROR]
+
+
+def test_manifests_are_no_part_of_fmi_2_and_decide_nothing_in_fmi_3(tmp_path):
+    name = "extra/org.x/fmi-ls-manifest.xml"
+    assert wrong(check(tmp_path, DESCRIPTIONS[2], {name: "<anything/>"})) == set()
+    report = check(tmp_path, DESCRIPTIONS[3], {name: "<anything/>"})
+    assert wrong(report) == {"layered.manifest"}
+    assert report.ok
+
+
 def test_manifests_of_layered_standards_have_three_attributes_and_any_root(tmp_path):
     name, space = "extra/org.x/fmi-ls-manifest.xml", 'xmlns:l="http://fmi-standard.org/fmi-ls-manifest"'
     sound = f'<anything {space} l:fmi-ls-name="org.x" l:fmi-ls-version="1" l:fmi-ls-description="d"><more/></anything>'
@@ -282,12 +307,44 @@ def test_terminals(fields, rules, tmp_path):
         (f"binaries/{FOLDERS[3]}/other{EXTENSION}", {"binary.missing"}),
         ("binaries/x86_64-windows/small.dll", {"binary.machine"}),
         ("binaries/amiga/small.so", {"binary.platform"}),
+        ("binaries/i686-linux/small.so", {"binary.platform"}),
+        ("binaries/x86-linux/small.so", {"binary.machine"}),
+        ("binaries/x86-windows/small.dll", {"binary.machine"}),
         ("elsewhere/small.so", {"binary.none"}),
     ],
 )
 def test_places_of_binaries(place, rules, tmp_path):
     path = write(tmp_path / "a.fmu", {"modelDescription.xml": DESCRIPTIONS[3], place: binary(3)})
     assert wrong(check_fmu(path, run=False)) == rules
+
+
+@pytest.mark.parametrize(
+    ("folder", "parts"),
+    [
+        ("x86-windows", ("x86", "windows", "")),
+        ("x86-linux", ("x86", "linux", "")),
+        ("x86_64-windows-msvc140mt", ("x86_64", "windows", "msvc140mt")),
+        ("aarch32-linux", ("aarch32", "linux", "")),
+        ("riscv64-linux", ("riscv64", "linux", "")),
+        ("darwin32", ("x86", "darwin", "")),
+        ("darwin64", ("x86_64", "darwin", "")),
+        ("win32", ("x86", "windows", "")),
+        ("i386-linux", None),
+        ("i586-linux", None),
+        ("x86_64-linux-Gnu", None),
+        ("x86_64-amiga", None),
+    ],
+)
+def test_names_of_platforms_are_those_of_the_standards(folder, parts):
+    """FMI 3.0.2 section 2.5.1 and FMI 2.0.4 section 2.3, name by name."""
+    assert parts_of(folder) == parts
+
+
+def test_darwin32_is_a_name_of_fmi_2(tmp_path):
+    for major, rules in ((2, set()), (3, {"binary.platform"})):
+        files = {"modelDescription.xml": DESCRIPTIONS[major], "binaries/darwin32/small.dylib": b""}
+        report = check_fmu(write(tmp_path / "a.fmu", files), run=False)
+        assert wrong(report) - {"binary.damaged"} == rules
 
 
 SYMBOLS = [

@@ -6,7 +6,7 @@ import sys
 import time
 
 import pytest
-from small_fmus import DESCRIPTIONS, PLAIN, SCHEDULED, members, only, write
+from small_fmus import DESCRIPTIONS, EXTENSION, PLAIN, SCHEDULED, members, only, write
 
 from fmu.check.child_process import RunLimits
 from fmu.check.findings import Severity
@@ -38,7 +38,6 @@ def test_scheduled_execution_runs(tmp_path):
 
 
 FAULTS = [
-    ("TOKEN", (2, 3), "run.token"),
     ("INSTANTIATE", (2, 3), "run.instantiate"),
     ("CRASH", (2, 3), "run.crash"),
     ("ABORT", (3,), "run.crash"),
@@ -46,7 +45,6 @@ FAULTS = [
     ("NAN", (2, 3), "run.nan"),
     ("GETTER", (2, 3), "run.getter"),
     ("UNREADABLE", (2, 3), "run.refused"),
-    ("ANY_STEP", (2, 3), "run.bad_step"),
     ("RESET", (2, 3), "run.reset"),
     ("REPEAT", (2, 3), "run.reset"),
     ("STATE", (2, 3), "run.state"),
@@ -66,6 +64,74 @@ FAULTS = [
 def test_each_fault_is_found(fault, major, rule, tmp_path):
     kind = "ModelExchange" if fault in ("COUNTS", "ITERATION") else "CoSimulation"
     assert rule in errors(check(tmp_path, major, fault, description=only(kind, DESCRIPTIONS[major])))
+
+
+def warnings(report):
+    return {finding.rule for finding in report.findings if finding.severity is Severity.WARNING}
+
+
+@pytest.mark.parametrize("major", [2, 3])
+@pytest.mark.parametrize(("fault", "rule"), [("TOKEN", "run.token"), ("ANY_STEP", "run.bad_step")])
+def test_what_no_importer_does_is_a_warning(fault, rule, major, tmp_path):
+    report = check(tmp_path, major, fault, description=only("CoSimulation", DESCRIPTIONS[major]))
+    assert errors(report) == set()
+    assert warnings(report) == {rule}
+
+
+def test_a_finding_of_several_experiments_is_told_once(tmp_path):
+    report = check(tmp_path, 3, "UNREADABLE", description=only("CoSimulation", DESCRIPTIONS[3]))
+    [finding] = report.findings
+    assert "CoSimulation, life cycle (and " in finding.message
+
+
+def test_what_a_crashing_fmu_printed_is_told(tmp_path):
+    report = check(tmp_path, 3, "CRASH", description=PLAIN)
+    assert any("the solver lost its way" in f.message for f in report.findings if f.rule == "run.crash")
+
+
+@pytest.mark.parametrize(("step", "points"), [("1", 1), ("0.4", 2), ("0.1", 10), ("0.05", 20)])
+@pytest.mark.parametrize("major", [2, 3])
+def test_no_experiment_goes_beyond_its_stop_time(step, points, major, tmp_path):
+    """Steps of one and of an odd number in a run, and sums of steps that are larger than the stop time by rounding."""
+    text = only("CoSimulation", DESCRIPTIONS[major]).replace('stepSize="0.1"', f'stepSize="{step}"')
+    assert check(tmp_path, major, "STOP", description=text).findings == []
+
+
+@pytest.mark.parametrize("major", [2, 3])
+def test_the_place_of_resources_is_given(major, tmp_path):
+    """Packers drop empty folders: importers make them again."""
+    assert check(tmp_path, major, "RESOURCES", description=only("CoSimulation", DESCRIPTIONS[major])).findings == []
+
+
+def test_a_run_that_ends_early_after_a_reset_is_told_with_both_times(tmp_path):
+    report = check(tmp_path, 3, "RESET_ENDS", description=PLAIN)
+    [text] = [finding.message for finding in report.findings if finding.rule == "run.reset"]
+    assert "ends at t = 0.1, the first one at t = 1.0" in text
+
+
+@pytest.mark.parametrize("stiffness", [1e4, 1e12])
+@pytest.mark.parametrize("major", [2, 3])
+def test_a_stiff_model_stays_finite(stiffness, major, tmp_path):
+    """Steps of a thousandth of the run would be unstable by factors of 10 and 1e9."""
+    text = only("ModelExchange", DESCRIPTIONS[major]).replace(
+        'fixed"><Real start="1"/>', f'fixed"><Real start="{stiffness}"/>'
+    )
+    text = text.replace('variability="fixed" start="1"', f'variability="fixed" start="{stiffness}"')
+    report = check(tmp_path, major, f"-DSTIFFNESS={stiffness}", description=text)
+    assert report.findings == []
+
+
+@pytest.mark.skipif(EXTENSION != ".so", reason="options of the ELF linker")
+def test_a_library_that_this_machine_lacks_is_told_once_and_is_no_error(tmp_path):
+    source, library = tmp_path / "vendor.c", tmp_path / "libvendor.so.7"
+    source.write_text("void solver_of_the_vendor(void) {}\n")
+    subprocess.run(["cc", "-shared", "-fPIC", "-Wl,-soname,libvendor.so.7", source, "-o", library], check=True)
+    needed = (f"-L{tmp_path}", "-Wl,--no-as-needed", "-l:libvendor.so.7")
+    report = check(tmp_path, 3, "UNDEFINED", *needed, description=PLAIN)
+    assert report.ok
+    assert report.executed == ()
+    [finding] = [finding for finding in report.findings if finding.rule == "run.library"]
+    assert "libvendor.so.7" in finding.message
 
 
 DIRECTIONAL = {
@@ -96,10 +162,15 @@ def test_derivatives_that_are_promised_are_asked_for(fault, major, rule, tmp_pat
 
 def test_a_hang_on_nan_is_named_and_ends(tmp_path):
     began = time.monotonic()
-    report = check(tmp_path, 3, "HANG", description=PLAIN, limits=RunLimits(seconds=4.0))
+    report = check(tmp_path, 3, "HANG", description=PLAIN, limits=RunLimits(seconds=30.0, bad_step_seconds=0.2))
     [finding] = [finding for finding in report.findings if finding.rule == "run.hang"]
-    assert "fmi3DoStep(0.0, nan)" in finding.message
+    assert "fmi3DoStep(0.0, nan): no answer within 0.2 s" in finding.message
+    assert finding.severity is Severity.WARNING
     assert time.monotonic() - began < 60.0  # it would take for ever
+
+
+def test_a_bad_step_has_two_seconds():
+    assert RunLimits().bad_step_seconds == 2.0
 
 
 def test_a_flood_of_output_is_limited(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from small_fmus import DESCRIPTIONS, SCHEDULED, members, write
 
 from fmu.check.fmu_file import check_fmu
-from fmu.check.xml_file import XmlError, XmlLimits, parse, schema_findings
+from fmu.check.xml_file import XmlError, XmlLimits, as_utf8, parse, schema_findings
 
 TEXT = DESCRIPTIONS[3]
 LAUGHS = (
@@ -50,6 +50,43 @@ def refusal(content):
 )
 def test_harmful_and_broken_xml(content, rule):
     assert refusal(content) == rule
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        ("<?xml version='1.0' encoding='ISO-8859-1'?><z a='é'/>".encode("latin-1"), "ISO-8859-1"),
+        ("<?xml version='1.0' encoding=\"windows-1252\"?><z a='é'/>".encode("cp1252"), "windows-1252"),
+        ("<?xml version='1.0' encoding='UTF-16'?><z a='é'/>".encode("utf-16"), "UTF-16"),
+        ("<?xml version='1.0' encoding='UTF-8'?><z a='é'/>".encode("latin-1"), "byte 44"),
+        ("<z a='é'/>".encode("latin-1"), "byte 6"),
+    ],
+)
+def test_other_codings_are_said_and_read(content, word):
+    text, [finding] = as_utf8(content, "f")
+    assert finding.rule == "xml.encoding"
+    assert word in finding.message
+    assert parse(text, "f").get("a") == "é"
+
+
+@pytest.mark.parametrize("coding", ["UTF-7", "EBCDIC-CP-US", "rot13", "unicode_escape", "nonsense"])
+def test_codings_that_hide_something_are_refused(coding):
+    with pytest.raises(XmlError, match=f"its encoding is {coding}"):
+        as_utf8(f"<?xml version='1.0' encoding='{coding}'?><z/>".encode(), "f")
+
+
+def test_utf_8_passes_as_it_is():
+    for content in (TEXT.encode(), b"\xef\xbb\xbf" + TEXT.encode(), b"<z/>", b""):
+        assert as_utf8(content, "f") == (content, [])
+
+
+def test_a_description_in_another_coding_is_checked_to_its_end(tmp_path):
+    text = TEXT.replace("UTF-8", "ISO-8859-1").replace('modelName="Small"', 'modelName="Größe"')
+    text = text.replace('name="margin"', 'name="1margin"')
+    report = check_fmu(write(tmp_path / "a.fmu", {**members(3), "modelDescription.xml": text.encode("latin-1")}))
+    assert [finding.rule for finding in report.findings] == ["xml.encoding", "variable.name"]
+    assert report.fmi_version == "3.0"
+    assert set(report.executed) == {"CoSimulation", "ModelExchange"}
 
 
 def test_size_and_number_of_elements():
@@ -98,6 +135,7 @@ def test_places_that_do_not_fit_the_schema_have_their_line(tmp_path):
 def test_other_documents(text, rule, tmp_path):
     report = check_fmu(write(tmp_path / "a.fmu", {**members(3), "modelDescription.xml": text}))
     assert [finding.rule for finding in report.findings] == [rule]
+    assert rule == "xml.root" or "FMI 1.0, which is not supported" in report.findings[0].message
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 PLACE_BYTES = 512
+EXTERNAL = "FMI 2.0.4 section 2.3; FMI 3.0.2 section 2.5.1: external libraries"
 
 
 class Stopped(Exception):
@@ -97,7 +98,15 @@ class Library:
         try:
             self.library = c.CDLL(plan["binary"])
         except OSError as error:
-            raise recorder.stop("run.load", f"The binary cannot be loaded: {error}.") from error
+            raise self._unloaded(str(error)) from error
+
+    def _unloaded(self, problem: str) -> Stopped:
+        library = problem.partition(":")[0]
+        if "cannot open shared object file" in problem and library != self.plan["binary"]:
+            text = f"This machine lacks the library {library}, which the binary needs: it was not run."
+            self.recorder.find("warning", "run.library", text, EXTERNAL)
+            return Stopped()
+        return self.recorder.stop("run.load", f"The binary cannot be loaded: {problem}.", EXTERNAL)
 
     def function(self, name: str) -> Callable[..., Any]:
         """Look up a function."""
@@ -121,11 +130,25 @@ class Library:
             text = f"{self.prefix}{name} discards: the rest of this experiment is left out ({self.said()})."
             self.recorder.find("note", "run.discard", text)
             raise Refused
+        self._require(name, status, shown)
+
+    def _require(self, name: str, status: int, shown: str = "") -> None:
         if status not in (OK, WARNING):
             raise self.recorder.stop(
                 "run.refused",
                 f"{self.prefix}{name}({shown}) returns {self.status(status)} in a legal call: {self.said()}.",
             )
+
+    def trial_derivatives(self, size: int) -> list[float] | None:
+        """Return the state derivatives at a point that an integrator tries; None where the FMU discards it."""
+        array = (c.c_double * max(size, 1))()
+        if size:
+            name = "GetDerivatives" if self.prefix == "fmi2" else "GetContinuousStateDerivatives"
+            status = self.call(name, array, c.c_size_t(size))
+            if status == DISCARD:
+                return None
+            self._require(name, status)
+        return list(array)[:size]
 
     def said(self) -> str:
         """Return the last message of the FMU."""

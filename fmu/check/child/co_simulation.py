@@ -32,7 +32,8 @@ class CoSimulation(Run):
             if self.ended:
                 break
             self.passed += 1
-            self._to(self.plan["start"] + self.passed * self.plan["step"])
+            # The last sum may be larger than the stop time by rounding.
+            self._to(min(self.plan["start"] + self.passed * self.plan["step"], self.plan["stop"]))
             found.append(self.point())
         return found
 
