@@ -47,6 +47,12 @@ def flow_system(automaton: Automaton, z: Mapping[str, npt.ArrayLike] | None = No
     ------
     DeclarationError
         For an unknown discrete state, a wrong shape, or names that are the same once their dots are replaced.
+
+    Notes
+    -----
+    ``control.input_output_response`` lets SciPy choose its steps, which grow where nothing happens: they can step over
+    a late pulse in a table of inputs, in silence. ``solve_ivp_kwargs={"max_step": ...}`` with the shortest interval of
+    the table, or the shortest pulse, prevents that.
     """
     point = FrozenPoint(automaton)
     layout = point.layout

@@ -95,6 +95,22 @@ def test_unknown_names_are_answered_with_the_known_ones():
     with pytest.raises(hm.DeclarationError, match=r"Pendulum \(parameters\) has no variable 'damp'; it has damping"):
         control.input_output_response(flow_system(Pendulum()), [0.0, 1.0], 0.0, [0.0, 0.0], params={"damp": 1.0})
 
+    def test_a_late_pulse_in_a_table_of_inputs_needs_a_bound_on_steps(self):
+        class Store(hm.HybridAutomaton):
+            x = hm.State(0.0, output=True)
+            u = hm.Input(0.0)
+
+            def flow_map(self, s):
+                return {"x": s.u}
+
+        times = np.arange(101.0)
+        pulse = np.where(times == 50.0, 1.0, 0.0)  # a triangle of area 1
+        response = control.input_output_response(
+            flow_system(Store()), times, pulse, [0.0], solve_ivp_kwargs={"max_step": 1.0, "rtol": 1e-10, "atol": 1e-10}
+        )
+        # Kinks within steps: the tolerance of 1e-10 is met step by step, in some hundred steps.
+        assert response.outputs[-1] == pytest.approx(1.0, abs=1e-7)
+
 
 def test_names_that_are_the_same_without_dots_are_refused():
     twice = hm.Composition("pair", {"a": BouncingBall(), "b": BouncingBall()}, names={"a.h": "b_h"})

@@ -137,6 +137,31 @@ def test_python_control_simulates_the_fmu_as_the_python_run_does(flow):
     np.testing.assert_allclose(response.outputs[0], arc.at("height", times), rtol=0, atol=1e-8)
 
 
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_a_late_pulse_in_a_table_of_inputs_needs_a_bound_on_steps(fmi, exported):
+    """As docs/interoperability.md says it."""
+
+    class Store(hm.HybridAutomaton):
+        x = hm.State(0.0, output=True)
+        u = hm.Input(0.0)
+
+        def flow_map(self, s):
+            return {"x": s.u}
+
+    times = np.arange(101.0)
+    pulse = np.where(times == 50.0, 1.0, 0.0)  # a triangle of area 1
+    accurate = {"rtol": 1e-10, "atol": 1e-10}
+    flow = FlowFunctions(exported(Store(), "store", fmi))
+    found = [
+        control.input_output_response(system(flow), times, pulse, flow.x, solve_ivp_kwargs=options).states[0, -1]
+        for options in (accurate, accurate | {"max_step": 1.0})
+    ]
+    flow.close()
+    assert found[0] == 0.0
+    # Kinks within steps: the tolerance of 1e-10 is met step by step, in some hundred steps.
+    assert found[1] == pytest.approx(1.0, abs=1e-7)
+
+
 def test_a_regulator_designed_on_the_fmus_matrices_holds_it(flow):
     """Linear-quadratic feedback by python-control brings the FMU's pendulum to rest."""
     still = np.zeros(4)
