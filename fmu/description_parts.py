@@ -13,6 +13,7 @@ from typing import Any
 from fmu.description_jumps import states_reset
 from fmu.description_names import variable_names, xml_text
 from fmu.description_structure import Structure, model_structure
+from fmu.device_names import no_device
 from fmu.experiment import proposed_step
 from fmu.quantities import display_attributes, quantity
 from fmu.units import base_unit
@@ -140,7 +141,7 @@ def model_identifier(name: str) -> str:
     """Return `name` as a C identifier: what the FMU's binary is called."""
     plain = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in name)
     # Names of files end at 255 characters.
-    return (plain if plain and not plain[0].isdigit() else f"_{plain}")[:200]
+    return no_device(plain if plain and not plain[0].isdigit() else f"_{plain}")[:200]
 
 
 def generation_tool() -> str:

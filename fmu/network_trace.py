@@ -12,7 +12,7 @@ from fmu.network_groups import Group
 from fmu.network_kin import Kin, watched
 from fmu.network_members import Members
 from fmu.network_pattern import NetworkPattern
-from fmu.trace import Trace, _Tracer, trace
+from fmu.trace import Trace, _Tracer, steady_trace, trace
 from hybrid_model import Automaton, Composition
 from hybrid_model.layout import Layout
 from hybrid_model.transitions import Trigger
@@ -52,7 +52,7 @@ def part_traces(parts: Sequence[Automaton]) -> tuple[list[Trace], list[int]]:
         if number is None:
             number = len(traces)
             with watched(part) as reads:
-                traces.append(_PartTracer(part).trace())
+                traces.append(steady_trace(_PartTracer, part))
             # Parts that all differ are not compared with all others.
             known[:] = [(Kin(part, reads), number), *known[: _MOST_KIN - 1]]
         alike.append(number)

@@ -126,7 +126,10 @@ class Symbols(np.ndarray[Any, np.dtype[Any]]):
         )
 
     def __float__(self) -> float:
-        raise TraceError("a traced value is converted to a number: use np.sin, np.exp, ... instead of math.sin, ....")
+        raise TraceError(
+            "a traced value is converted to a number: use np.sin, np.exp, ... instead of math.sin, ..., and "
+            "np.array([...]) instead of writing into np.zeros(...)."
+        )
 
     def __int__(self) -> int:
         raise TraceError("a traced value is converted to an integer: use np.floor instead of int.")

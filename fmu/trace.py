@@ -17,6 +17,7 @@ from fmu.errors import TraceError
 from fmu.symbols import expressions, symbol_vector, symbols
 from hybrid_model import Automaton, Values
 from hybrid_model.layout import Layout
+from hybrid_model.real_numbers import told
 from hybrid_model.transitions import Assignments, Trigger
 from hybrid_model.variables import Kind, Variable
 
@@ -127,10 +128,39 @@ def trace(automaton: Automaton) -> Trace:
     Raises
     ------
     TraceError
-        If a map does with a value what only a number allows, if the time of a time event depends on anything but
-        parameters and discrete states, or if an internal event depends on or changes more than those.
+        If a map does with a value what only a number allows, if it gives other expressions when it is called again, if
+        the time of a time event depends on anything but parameters and discrete states, or if an internal event depends
+        on or changes more than those.
     """
-    return _Tracer(automaton).trace()
+    return steady_trace(_Tracer, automaton)
+
+
+def steady_trace(tracer: type[_Tracer], automaton: Automaton) -> Trace:
+    """Trace an automaton twice: what changes from call to call, such as a random number, would be frozen for ever.
+
+    Parameters
+    ----------
+    tracer : type
+        `_Tracer`, or a class derived from it.
+    automaton : Automaton
+        What is traced.
+
+    Raises
+    ------
+    TraceError
+        As `trace`.
+    """
+    traced, again = tracer(automaton).trace(), tracer(automaton).trace()
+    whose = ["start_map", "flow_map", "flow_set", "a jump set", "the time of an event", "outputs"]
+    whose += [f"the jump map of {info.name!r}" for info in automaton.jumps]
+    for what, one, other in zip(whose, traced.functions, again.functions, strict=True):
+        if one.serialize() != other.serialize():
+            raise TraceError(
+                f"{what} of {automaton.name} is another one when it is called again: what changes from call to call "
+                "(np.random, the time of day, a counter) cannot be traced, because its present value would stay for "
+                "ever; make it an input, or a parameter with a value drawn beforehand."
+            )
+    return traced
 
 
 class _Tracer:
@@ -203,22 +233,31 @@ class _Tracer:
 
     def _elements(self, variable: Variable, value: Any) -> list[ca.SX]:
         """Return a computed value row by row; numbers of another shape would land on the wrong elements."""
-        given = expressions(value)
+        remedy = f"return an array of shape {variable.shape}, or one number for all elements"
+        remedy = remedy if variable.shape else "return one number"
+        try:
+            given = expressions(value)
+        except NotImplementedError as error:
+            raise TraceError(
+                f"{self.automaton.name}: the value computed for {variable.name} is {told(value)}: {remedy}."
+            ) from error
         shape = value.shape if isinstance(value, ca.SX) and not value.is_scalar() else symbols(value).shape
         if shape == () and len(given) == 1:
             return given * variable.size
         if shape != variable.shape:
-            remedy = f"return an array of shape {variable.shape}, or one number for all elements"
             raise TraceError(
                 f"{self.automaton.name}: the value computed for {variable.name} has shape {shape}, but {variable.name} "
-                f"has shape {variable.shape}: {remedy if variable.shape else 'return one number'}."
+                f"has shape {variable.shape}: {remedy}."
             )
         return given
 
     def _scalars(self, margins: list[Any], what: str) -> ca.SX:
         elements = []
         for margin in margins:
-            given = expressions(margin)
+            try:
+                given = expressions(margin)
+            except NotImplementedError as error:
+                raise TraceError(f"{what} of {self.automaton.name} is {told(margin)}: return one number.") from error
             if len(given) != 1:
                 raise TraceError(
                     f"{what} of {self.automaton.name} has {len(given)} margins: join them to one number by least "

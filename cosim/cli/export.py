@@ -19,6 +19,7 @@ from typing import Any
 
 from cosim.cli.exits import Exit, UsageError, progress, start_values
 from fmu.build import check_target
+from fmu.device_names import no_device
 from fmu.errors import ExportError
 from fmu.export import export_fmu
 from fmu.platforms import PLATFORMS
@@ -118,7 +119,7 @@ def _platforms(names: list[str] | None) -> tuple[str, ...] | None:
 
 def _file_name(name: str) -> str:
     # The name of an automaton is free; that of a file must stay in the folder.
-    return re.sub(r"[^\w.+-]", "_", name).lstrip(".") or "_"
+    return no_device(re.sub(r"[^\w.+-]", "_", name).lstrip(".") or "_")
 
 
 def _automata(target: str, starts: dict[str, float]) -> tuple[float | None, dict[str, Automaton]]:

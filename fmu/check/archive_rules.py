@@ -13,10 +13,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from fmu.device_names import is_device
+
 ENCRYPTED, STORED, DEFLATED = 0x1, 0, 8
 DESCRIPTION = "modelDescription.xml"
 _LOCAL_HEADER = 30
-_RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ def _name_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[t
         yield "long", f"The member {shown} has a name of {len(name)} characters, which file systems refuse; shorten it."
     if any(part.rstrip(". ") != part for part in parts if part not in ("", ".", "..")):
         yield "trailing", f"The member {shown} ends in a dot or blank, which Windows drops; rename it."
-    if any(part.partition(".")[0].lower() in _RESERVED for part in parts):
+    if any(is_device(part) for part in parts):
         yield "reserved", f"The member {shown} has the name of a Windows device; rename it."
 
 

@@ -1,6 +1,8 @@
 """What an automaton may not do when it is to become an FMU, and the sentence that says so."""
 
+import itertools
 import math
+import time
 
 import numpy as np
 import pytest
@@ -81,3 +83,40 @@ def test_functions_that_need_numbers_are_refused_with_a_remedy(function):
 
     with pytest.raises(TraceError, match=r"flow_map of Sorting cannot be traced.*Remedy: .*np\.where"):
         trace(Sorting())
+
+
+@pytest.mark.parametrize("draw", [itertools.count().__next__, np.random.default_rng(2).random, time.perf_counter_ns])
+@pytest.mark.parametrize(
+    ("name", "body", "what"),
+    [
+        ("flow_map", lambda s, one: {"h": s.v, "v": -s.g * one}, "flow_map"),
+        ("flow_set", lambda s, one: s.h + one, "flow_set"),
+        ("jump_set", lambda s, one: -s.h - one, "a jump set"),
+        ("jump_map", lambda s, one: {"v": one}, "the jump map of 'jump'"),
+        ("outputs", lambda s, one: {"y": s.h * one}, "outputs"),
+        ("start_map", lambda s, one: {"n": one}, "start_map"),
+    ],
+)
+def test_what_changes_from_call_to_call_is_not_frozen(draw, name, body, what):
+    declared = {"outputs": {"y": hm.Output()}, "start_map": {"n": hm.DiscreteState(computed=True)}}.get(name, {})
+    wrong = type("Wrong", (BouncingBall,), {**declared, name: lambda self, s: body(s, draw())})
+    with pytest.raises(TraceError, match=f"^{what} of Wrong is another one when it is called again: .*np.random"):
+        trace(wrong())
+
+
+def test_random_numbers_drawn_beforehand_are_parameters():
+    class Noisy(BouncingBall):
+        kicks = hm.Parameter(np.random.default_rng(1).random(3))
+
+        def jump_map(self, s):
+            return {"h": 0.0, "v": -s.e * s.v + s.kicks[0]}
+
+    assert trace(Noisy()).resets[0](0.0, [0.0, -1.0], [], [], [9.81, 0.7, 0.25, 0.0, 0.0])[0][1] == 0.7 + 0.25
+
+
+@pytest.mark.parametrize("value", ["1", None, 1j, {}, 10**400, object()])
+@pytest.mark.parametrize("name", ["flow_map", "jump_map"])
+def test_what_is_no_number_is_refused_in_symbols_too(name, value):
+    wrong = type("Wrong", (BouncingBall,), {name: lambda self, s: {"h": value, "v": -s.g}})
+    with pytest.raises(TraceError, match=r"^Wrong: the value computed for h is .*: return one number\.$"):
+        trace(wrong())
