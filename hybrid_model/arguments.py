@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from hybrid_model.automaton import Automaton
+from hybrid_model.automaton import Automaton, require_made
 from hybrid_model.errors import DeclarationError, SimulationError
+from hybrid_model.real_numbers import told
 
 
 def require_automaton(caller: str, given: Any) -> None:
@@ -28,13 +29,15 @@ def require_automaton(caller: str, given: Any) -> None:
         If it is the class, or no automaton.
     """
     if isinstance(given, Automaton):
+        require_made(given)
         return
     if isinstance(given, type) and issubclass(given, Automaton):
         raise DeclarationError(
             f"{caller} was given the class {given.__name__}, but takes an instance: write {given.__name__}()."
         )
     raise DeclarationError(
-        f"{caller} was given {given!r}, but takes an automaton: give an instance of a HybridAutomaton or a Composition."
+        f"{caller} was given {told(given)}, but takes an automaton: give an instance of a HybridAutomaton or a "
+        "Composition."
     )
 
 
@@ -98,5 +101,10 @@ def real_number(name: str, given: Any) -> float:
     """
     is_scalar = isinstance(given, np.ndarray) and given.shape == () and given.dtype.kind in "iuf"
     if not (is_scalar or isinstance(given, numbers.Real)):
-        raise SimulationError(f"{name} = {given!r} is not a number: give a number in s.")
-    return float(given)
+        both = isinstance(given, (tuple, list)) and len(given) == 2
+        remedy = "a number in s, and the start by t_start=..." if both else "a number in s"
+        raise SimulationError(f"{name} = {told(given)} is not a number: give {remedy}.")
+    try:
+        return float(given)
+    except OverflowError as error:
+        raise SimulationError(f"{name} = {told(given)} is too large: give a number in s.") from error

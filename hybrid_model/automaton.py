@@ -324,7 +324,7 @@ class HybridAutomaton(Automaton):
         return float(number)
 
 
-def require_automaton(given: Automaton) -> None:
+def require_automaton(given: object) -> None:
     """Refuse what is no automaton, such as a class instead of an instance.
 
     Raises
@@ -335,7 +335,23 @@ def require_automaton(given: Automaton) -> None:
     if isinstance(given, type):
         raise DeclarationError(f"{given.__name__} is a class: make an instance of it, {given.__name__}().")
     if not isinstance(given, Automaton):
-        raise DeclarationError(f"{given!r} is not an automaton: give a HybridAutomaton or a Composition.")
+        raise DeclarationError(f"{told(given)} is not an automaton: give a HybridAutomaton or a Composition.")
+    require_made(given)
+
+
+def require_made(given: Automaton) -> None:
+    """Refuse an automaton whose class has an ``__init__`` of its own that does not call that of its base.
+
+    Raises
+    ------
+    DeclarationError
+        With what to write.
+    """
+    if not hasattr(given, "variables"):
+        cls = type(given).__name__
+        raise DeclarationError(
+            f"{cls} has an __init__ that leaves the variables out: call super().__init__(...) in it."
+        )
 
 
 def _instance_name(cls: type, given: object) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from hybrid_model.automaton import Automaton, require_automaton
 from hybrid_model.errors import AlgebraicLoopError, DeclarationError, WiringError
 from hybrid_model.layout import Layout
+from hybrid_model.real_numbers import told
 from hybrid_model.transitions import Assignments, ClockInfo, JumpInfo, Priority, Trigger
 from hybrid_model.variables import Kind, Value, Values, Variable, element_names, unknown_name
 
@@ -74,6 +75,7 @@ class Composition(Automaton):
         connections: Mapping[str, Source] | None = None,
         names: Mapping[str, str] | None = None,
     ) -> None:
+        _require_arguments(name, parts, connections or {}, names or {})
         self.name = name
         self.parts = dict(parts)
         for automaton in self.parts.values():
@@ -286,10 +288,38 @@ class _PartValues(Values):
         return value
 
 
+def _require_arguments(name: object, parts: object, connections: object, names: object) -> None:
+    if not isinstance(name, str):
+        raise WiringError(
+            f"a composition was given {told(name)} as its name: give a text first, Composition('plant', ...)."
+        )
+    if not isinstance(parts, Mapping):
+        raise WiringError(
+            f"{name}: the parts are {told(parts)}: give a mapping, {{'name of the part': automaton}}, or write "
+            f"hm.product({name!r}, first, second)."
+        )
+    for what, given, entry in (
+        ("connections", connections, "{'part.input': 'part.output'}"),
+        ("names", names, "{'part.variable': 'name'}"),
+    ):
+        if not isinstance(given, Mapping):
+            raise WiringError(f"{name}: the {what} are {told(given)}: give a mapping, {entry}.")
+    for part in parts:
+        if not isinstance(part, str):
+            raise WiringError(
+                f"{name}: a part has the name {told(part)}: give texts, {{'name of the part': automaton}}."
+            )
+
+
 def _wires(composition: Composition, connections: Mapping[str, Source]) -> dict[tuple[str, str], _Wire]:
     wires = {}
     for target, source in connections.items():
         part, variable = _find(composition, target, (Kind.INPUT,), "an input")
+        if not isinstance(source, (str, Sequence)):
+            raise WiringError(
+                f"{composition.name}: {target} is connected to {told(source)}: name an output, 'part.output', or "
+                "give a list of names for the elements of a vector."
+            )
         given = [source] if isinstance(source, str) else list(source)
         found = [_find(composition, name, (Kind.STATE, Kind.DISCRETE, Kind.OUTPUT), "an output") for name in given]
         stacked = not isinstance(source, str)
@@ -310,6 +340,8 @@ def _source_elements(composition: Composition, wire: _Wire) -> list[tuple[str, s
 
 
 def _find(composition: Composition, scoped: str, kinds: tuple[Kind, ...], what: str) -> tuple[str, Variable]:
+    if not isinstance(scoped, str):
+        raise WiringError(f"{composition.name}: {told(scoped)} is not {what}: write 'part.variable'.")
     # The longest part that fits: names of parts may contain dots.
     ends = [at for at, letter in enumerate(scoped) if letter == "."]
     part = next((scoped[:at] for at in reversed(ends) if scoped[:at] in composition.parts), None)

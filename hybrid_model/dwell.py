@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from hybrid_model.automaton import Automaton
+from hybrid_model.automaton import Automaton, require_automaton
 from hybrid_model.errors import DeclarationError
 from hybrid_model.margins import greatest, least
+from hybrid_model.real_numbers import is_real
 from hybrid_model.transitions import Assignments, Trigger
 from hybrid_model.variables import Kind, Value, Values, Variable
 
@@ -41,8 +42,9 @@ class MinimumDwell(Automaton):
     """
 
     def __init__(self, automaton: Automaton, dwell: float) -> None:
-        if not (math.isfinite(dwell) and dwell > 0.0):
-            raise DeclarationError(f"the minimum dwell time of {automaton.name} is {dwell} s: give a positive time.")
+        require_automaton(automaton)
+        if not (is_real(dwell) and math.isfinite(dwell) and dwell > 0.0):
+            raise DeclarationError(f"the minimum dwell time of {automaton.name} is {dwell!r} s: give a positive time.")
         taken = {SINCE, HELD, DWELL} & {variable.name for variable in automaton.variables}
         if taken:
             raise DeclarationError(f"{automaton.name} has a variable {min(taken)!r} already: rename it.")

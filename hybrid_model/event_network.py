@@ -16,7 +16,9 @@ import numpy as np
 
 from hybrid_model.arc import HybridArc
 from hybrid_model.arc_values import ReceivedValues
+from hybrid_model.arguments import real_number, require_inputs, require_options
 from hybrid_model.automaton_block import AutomatonBlock
+from hybrid_model.calls import explained
 from hybrid_model.compose import Composition, ElementWire
 from hybrid_model.errors import SimulationError, WiringError
 from hybrid_model.execution import Execution, JumpRecord
@@ -61,6 +63,7 @@ class NetworkRun:
         return self.arcs[part].event_times(jump)
 
 
+@explained(solver=Solver, zeno=ZenoGuard)
 def simulate_network(
     network: Composition,
     t_end: float,
@@ -97,6 +100,10 @@ def simulate_network(
     SimulationError
         As `simulate`.
     """
+    require_inputs(inputs)
+    require_options("solver", solver, Solver, first="method")
+    require_options("zeno", zeno, ZenoGuard, first="max_jumps")
+    t_start, t_end = real_number("t_start", t_start), real_number("t_end", t_end)
     if not (math.isfinite(t_end) and math.isfinite(t_start) and t_end >= t_start):
         raise SimulationError(
             f"the end time is {t_end} s and the start {t_start} s: give finite times, the end not before the start."

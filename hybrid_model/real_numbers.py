@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,11 @@ FLOATS = (float, np.float64)
 """What a map returns most often."""
 LONGEST = 80
 """Characters of a value that a message shows; a number may have thousands of digits."""
+
+
+def is_real(given: object) -> bool:
+    """Whether something is one real number."""
+    return isinstance(given, numbers.Real)
 
 
 def real_array(given: Any) -> npt.NDArray[np.float64]:

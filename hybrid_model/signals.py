@@ -13,6 +13,7 @@ import numpy.typing as npt
 from hybrid_model.errors import DeclarationError, SimulationError
 from hybrid_model.layout import Layout, Place
 from hybrid_model.real_numbers import real_array, told
+from hybrid_model.signatures import require_map
 from hybrid_model.variables import FloatArray, Kind, Variable, start_array, unknown_name
 
 
@@ -30,6 +31,9 @@ class Signal:
 
     value: Callable[[float], npt.ArrayLike]
     breakpoints: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        require_map("value of a Signal", self.value, ("t",))
 
 
 InputValue = npt.ArrayLike | Callable[[float], npt.ArrayLike] | Signal
@@ -64,6 +68,7 @@ class Inputs:
                 self._signals.append((places[name], value.value))
                 breakpoints += _finite_breakpoints(name, value)
             elif callable(value):
+                require_map(f"input {name}", value, ("t",))
                 if places[name].variable.discrete:
                     raise DeclarationError(
                         f"{layout.automaton.name}: input {name} changes at jumps only, so it cannot be a plain "
@@ -143,10 +148,17 @@ def unknown_input(owner: str, name: str, known: Mapping[str, object]) -> str:
 
 
 def _finite_breakpoints(name: str, signal: Signal) -> list[float]:
-    breakpoints = [float(b) for b in signal.breakpoints]
-    if not all(map(math.isfinite, breakpoints)):
-        raise DeclarationError(f"input {name} has the breakpoints {breakpoints}: give finite times in s.")
-    return breakpoints
+    try:
+        breakpoints = real_array(signal.breakpoints)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DeclarationError(
+            f"input {name} has the breakpoints {told(signal.breakpoints)}: give times in s."
+        ) from error
+    if breakpoints.ndim != 1 or not np.isfinite(breakpoints).all():
+        raise DeclarationError(
+            f"input {name} has the breakpoints {told(signal.breakpoints)}: give a sequence of finite times in s."
+        )
+    return [float(b) for b in breakpoints]
 
 
 def _sample(variable: Variable, signal: Callable[[float], npt.ArrayLike], t: float) -> FloatArray:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from hybrid_model.arc import HybridArc
 from hybrid_model.arguments import real_number, require_automaton, require_inputs, require_options
 from hybrid_model.automaton import Automaton
+from hybrid_model.calls import explained
 from hybrid_model.errors import SimulationError
 from hybrid_model.execution import Execution
 from hybrid_model.layout import Layout
@@ -18,6 +19,7 @@ from hybrid_model.stop import Stop
 from hybrid_model.zeno import ZenoGuard
 
 
+@explained(solver=Solver, zeno=ZenoGuard)
 def simulate(
     automaton: Automaton,
     t_end: float,

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from hybrid_model.arc import HybridArc
 from hybrid_model.arguments import require_automaton, require_inputs, require_options
 from hybrid_model.automaton import Automaton
+from hybrid_model.calls import explained
 from hybrid_model.errors import DataError
 from hybrid_model.samples import Samples
 from hybrid_model.signals import InputValue
@@ -26,6 +27,7 @@ from hybrid_model.verify_report import Findings, Verification
 from hybrid_model.verify_subject import Subject, Tolerances
 
 
+@explained(tolerances=Tolerances)
 def verify(
     automaton: Automaton,
     data: Any,

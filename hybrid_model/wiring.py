@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hybrid_model.automaton import Automaton
+from hybrid_model.automaton import Automaton, require_automaton
 from hybrid_model.compose import Composition, Source
 from hybrid_model.errors import WiringError
+from hybrid_model.real_numbers import told
 
 
 def product(name: str, *parts: Automaton) -> Composition:
@@ -44,8 +45,8 @@ def series(name: str, first: Automaton, second: Automaton, connections: Mapping[
     WiringError
         As in `Composition`, and if both parts have one name.
     """
-    wires: dict[str, Source] = {f"{second.name}.{into}": f"{first.name}.{out}" for into, out in connections.items()}
-    return Composition(name, _by_name(name, (first, second)), wires)
+    parts = _by_name(name, (first, second))
+    return Composition(name, parts, _wires(name, second, first, connections))
 
 
 def feedback(
@@ -71,14 +72,23 @@ def feedback(
     AlgebraicLoopError
         If measured and actuated signals need each other at one instant.
     """
-    wires: dict[str, Source] = {
-        **{f"{controller.name}.{into}": f"{plant.name}.{out}" for into, out in measured.items()},
-        **{f"{plant.name}.{into}": f"{controller.name}.{out}" for into, out in actuated.items()},
-    }
-    return Composition(name, _by_name(name, (plant, controller)), wires)
+    parts = _by_name(name, (plant, controller))
+    wires = _wires(name, controller, plant, measured) | _wires(name, plant, controller, actuated)
+    return Composition(name, parts, wires)
+
+
+def _wires(name: str, into: Automaton, source: Automaton, connections: Mapping[str, str]) -> dict[str, Source]:
+    if not isinstance(connections, Mapping):
+        raise WiringError(
+            f"{name}: the connections are {told(connections)}: give a mapping, {{'input of {into.name}': 'output of "
+            f"{source.name}'}}."
+        )
+    return {f"{into.name}.{target}": f"{source.name}.{output}" for target, output in connections.items()}
 
 
 def _by_name(name: str, parts: tuple[Automaton, ...]) -> dict[str, Automaton]:
+    for part in parts:
+        _require_part(name, part)
     named = {part.name: part for part in parts}
     if len(named) < len(parts):
         raise WiringError(
@@ -86,3 +96,11 @@ def _by_name(name: str, parts: tuple[Automaton, ...]) -> dict[str, Automaton]:
             "made, as in Plant('left')."
         )
     return named
+
+
+def _require_part(name: str, given: object) -> None:
+    if isinstance(given, Mapping):
+        raise WiringError(f"{name}: a part is a mapping: for parts by other names than their own write hm.Composition.")
+    if isinstance(given, (list, tuple)):
+        raise WiringError(f"{name}: a part is {told(given)}: give automata one after the other, or *parts for a list.")
+    require_automaton(given)

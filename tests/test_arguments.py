@@ -1,6 +1,7 @@
 """Slips in the arguments of a run are answered by one sentence with the remedy."""
 
 import math
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -80,3 +81,159 @@ def test_the_zeno_guard_takes_the_smallest_limits_and_whole_floats():
     arc = hm.simulate(Thermostat(), 1e3, zeno=guard)
     assert arc.stop is hm.Stop.JUMPS
     assert len(arc.jumps) == 3
+
+
+class Follower(hm.HybridAutomaton):
+    """y' = u - y."""
+
+    u = hm.Input(0.0)
+    y = hm.State(0.0, output=True)
+
+    def flow_map(self, s):
+        return {"y": s.u - s.y}
+
+
+RUNS = {
+    "simulate": lambda *given, **named: hm.simulate(BouncingBall(), *given, **named),
+    "simulate_network": lambda *given, **named: hm.simulate_network(
+        hm.product("balls", BouncingBall("a"), BouncingBall("b")), *given, **named
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RUNS)
+@pytest.mark.parametrize(
+    ("given", "named", "sentence"),
+    [
+        ((1.0,), {"rtol": 1e-6}, r"has no option 'rtol': write solver=hm\.Solver\(rtol=1e-06\)\."),
+        ((1.0,), {"method": "Radau"}, r"has no option 'method': write solver=hm\.Solver\(method='Radau'\)\."),
+        ((1.0,), {"max_jumps": 5}, r"has no option 'max_jumps': write zeno=hm\.ZenoGuard\(max_jumps=5\)\."),
+        ((1.0,), {"input": {}}, r"has no option 'input': write 'inputs'\."),
+        ((1.0,), {"tolerance": 1}, r"has no option 'tolerance'; it has t_start, inputs, solver, zeno\."),
+        ((), {}, r"needs t_end: write {name}\((automaton|network), t_end\)\."),
+        (
+            (0.0, 1.0),
+            {},
+            r"takes (automaton|network) and t_end by position, but 3 arguments were given: give the others",
+        ),
+        ((1.0,), {"t_end": 2.0}, r"was given (automaton|network) twice"),
+        (((0.0, 1.0),), {}, None),
+    ],
+)
+def test_arguments_that_a_run_does_not_have(name, given, named, sentence):
+    with pytest.raises(hm.SimulationError) as caught:
+        RUNS[name](*given, **named)
+    if sentence is None:
+        assert (
+            str(caught.value) == "t_end = (0.0, 1.0) is not a number: give a number in s, and the start by t_start=...."
+        )
+    else:
+        assert re.match(
+            f"^{name} {sentence.format(name=name) if '{name}' in sentence else sentence}", str(caught.value)
+        )
+
+
+def test_variables_are_no_options_of_a_run():
+    with pytest.raises(hm.SimulationError, match=r"simulate has no option 'u': write inputs={'u': 2\.0}\."):
+        hm.simulate(Follower(), 1.0, u=2.0)
+    with pytest.raises(
+        hm.SimulationError, match=r"'h': values are given when an instance is made, BouncingBall\(h=2\.0\)\."
+    ):
+        hm.simulate(BouncingBall(), 1.0, h=2.0)
+    with pytest.raises(
+        hm.SimulationError, match=r"verify has no option 'rtol': write tolerances=hm\.Tolerances\(rtol=0\.1\)"
+    ):
+        hm.verify(BouncingBall(), hm.simulate(BouncingBall(), 0.1), rtol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("value", "sentence"),
+    [
+        (lambda: 1.0, r"input u takes \(\), but is called with \(t\): write lambda t: \.\.\."),
+        (lambda t, s: 1.0, r"input u takes \(t, s\), but is called with \(t\)"),
+        (lambda t: "on", r"input u is 'on' at t = 0 s: return numbers"),
+        (lambda t: None, r"input u is None at t = 0 s: return numbers"),
+        (lambda t: 1j, r"input u is 1j, a complex number at t = 0 s: return numbers"),
+        ("on", r"Follower\.u = 'on' is not a number"),
+        ("1", r"Follower\.u = '1' is not a number"),
+        (None, r"Follower\.u = None is not a number"),
+        (hm.Signal(lambda t: 1.0, 0.5), r"input u has the breakpoints 0\.5: give a sequence of finite times in s"),
+        (hm.Signal(lambda t: 1.0, ["soon"]), r"input u has the breakpoints \['soon'\]: give times in s"),
+    ],
+)
+def test_values_of_an_input(value, sentence):
+    with pytest.raises(hm.HybridModelError, match=f"^{sentence}"):
+        hm.simulate(Follower(), 1.0, inputs={"u": value})
+
+
+def test_a_signal_needs_a_function():
+    with pytest.raises(
+        hm.DeclarationError, match=r"^value of a Signal is 1\.0, but must be a function: write lambda t: "
+    ):
+        hm.Signal(1.0, [0.5])
+
+
+class Unmade(BouncingBall):
+    def __init__(self):
+        self.colour = "red"
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda: hm.simulate(Unmade(), 1.0),
+        lambda: hm.product("balls", Unmade()),
+        lambda: hm.MinimumDwell(Unmade(), 0.1),
+        lambda: hm.verify(Unmade(), None),
+    ],
+)
+def test_an_own_constructor_must_call_that_of_its_base(use):
+    with pytest.raises(hm.DeclarationError, match=r"Unmade has an __init__ that .*: call super\(\).__init__\(\.\.\.\)"):
+        use()
+
+
+@pytest.mark.parametrize(
+    ("compose", "sentence"),
+    [
+        (lambda a, b: hm.product("p", [a, b]), r"^p: a part is \[.*: give automata one after the other, or \*parts"),
+        (lambda a, b: hm.product("p", {"a": a}), r"^p: a part is a mapping: .* write hm\.Composition"),
+        (lambda a, b: hm.product(a, b), r"^a composition was given .* as its name: give a text first"),
+        (lambda a, b: hm.product("p", BouncingBall, b), r"^BouncingBall is a class: make an instance of it"),
+        (lambda a, b: hm.series("p", a, [b], {}), r"^p: a part is \["),
+        (
+            lambda a, b: hm.series("p", a, b, "h"),
+            r"^p: the connections are 'h': give a mapping, {'input of b': 'output of",
+        ),
+        (lambda a, b: hm.feedback("p", a, b, {}, [("u", "y")]), r"^p: the connections are \[\('u', 'y'\)\]"),
+        (
+            lambda a, b: hm.Composition("p", [a, b]),
+            r"^p: the parts are \[.*: give a mapping, .* hm\.product\('p', first",
+        ),
+        (lambda a, b: hm.Composition({"a": a}, {}), r"^a composition was given .* as its name"),
+        (lambda a, b: hm.Composition("p", {1: a}), r"^p: a part has the name 1: give texts"),
+        (lambda a, b: hm.Composition("p", {"a": a}, [("a.u", "a.h")]), r"^p: the connections are \[.*: give a mapping"),
+        (
+            lambda a, b: hm.Composition("p", {"a": a, "f": Follower()}, {"f.u": 1.0}),
+            r"^p: f\.u is connected to 1\.0: name",
+        ),
+        (
+            lambda a, b: hm.Composition("p", {"a": a, "f": Follower()}, {"f.u": a}),
+            r"^p: f\.u is connected to <.*: name an",
+        ),
+        (
+            lambda a, b: hm.Composition("p", {"f": Follower()}, {3: "f.y"}),
+            r"^p: 3 is not an input: write 'part\.variable'",
+        ),
+    ],
+)
+def test_compositions_of_something_else(compose, sentence):
+    with pytest.raises(hm.HybridModelError, match=sentence):
+        compose(BouncingBall("a"), BouncingBall("b"))
+
+
+@pytest.mark.parametrize("dwell", ["1", None, 0.0, math.nan])
+def test_a_dwell_time_is_a_number(dwell):
+    with pytest.raises(
+        hm.DeclarationError, match=r"^the minimum dwell time of BouncingBall is .* s: give a positive time"
+    ):
+        hm.MinimumDwell(BouncingBall(), dwell)
