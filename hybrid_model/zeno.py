@@ -112,7 +112,8 @@ class ZenoMonitor:
         if count > self.guard.jumps_at_once and not on_state:
             return (
                 f"{automaton}: {count} jumps of {jump!r} at one instant, t = {t:.9g} s: its time is still not after "
-                "the present. Let the jump map move the time on past it, or start with the next time to come."
+                "the present. Let the jump map move the time on past it; where a run starts later than its clock, "
+                "declare the clock's state with computed=True and let start_map give the next time to come."
             )
         if count > self.guard.jumps_at_once:
             return (

@@ -1,7 +1,9 @@
 """The command line as its users see it: output, exit status, sentences."""
 
 import csv
+import io
 import json
+import sys
 
 import pytest
 
@@ -172,3 +174,37 @@ def test_paper_reproduces_compares_and_draws(tmp_path, capsys):
             assert (tmp_path / f"{kind}_{figure}.pdf").stat().st_size > 3_000
     table = capsys.readouterr().out
     assert "FMUs through fmpy                35  4, 10, 13, 8" in table
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "cp1252", "latin-1"])
+def test_letters_that_the_terminal_does_not_have_end_no_run(small, tmp_path, monkeypatch, encoding):
+    """A scenario whose name has letters of three alphabets, printed on a terminal that has but few."""
+    named = tmp_path / "named.toml"
+    named.write_text(SMALL.replace('"small"', '"Größe Ω 面"'), encoding="utf-8")
+    written = io.BytesIO()
+    monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(written, encoding=encoding))
+    assert main(["simulate", str(named)]) == 0
+    sys.stdout.flush()
+    text = written.getvalue().decode(encoding)
+    assert text.startswith(("Gr\\xf6\\xdfe \\u03a9 \\u9762: ", "Größe \\u03a9 \\u9762: "))
+    # What cannot be found is told on such a terminal too.
+    complaint = io.BytesIO()
+    monkeypatch.setattr(sys, "stderr", io.TextIOWrapper(complaint, encoding=encoding, errors="strict"))
+    assert main(["simulate", "Ω.toml"]) == 2
+    sys.stderr.flush()
+    assert b"\\u03a9.toml" in complaint.getvalue()
+
+
+def test_a_byte_order_mark_is_no_part_of_a_scenario_or_its_samples(tmp_path, capsys):
+    mark = b"\xef\xbb\xbf"
+    weights = SMALL.replace('kind = "constant"\nvalue = 1.0', 'kind = "sampled"\nfile = "w.csv"')
+    (tmp_path / "marked.toml").write_bytes(mark + weights.encode())
+    (tmp_path / "w.csv").write_bytes(mark + b"0,1\n2,1\n6,1\n")
+    assert main(["simulate", str(tmp_path / "marked.toml"), "--json"]) == 0
+    marked = json.loads(capsys.readouterr().out)
+    # The samples are the constant weight of the other scenario, from the first row on.
+    (tmp_path / "plain.toml").write_text(SMALL)
+    assert main(["simulate", str(tmp_path / "plain.toml"), "--json"]) == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert marked["x_end"] == pytest.approx(plain["x_end"], abs=1e-9)
+    assert marked["events_total"] == plain["events_total"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -32,6 +33,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         Exit status: 0 done, 1 failed, 2 wrong usage, 3 stopped by a Zeno guard.
     """
+    _write_any_name()
     parser = argparse.ArgumentParser(
         prog="hybrid-fmu",
         description="Hybrid automata: run them event-exactly, export them as FMUs, co-simulate them.",
@@ -53,6 +55,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(Exit.DONE)
     except (HybridModelError, ExportError, BuildError, CosimError, OSError) as error:
         return _report(error, Exit.FAILED)
+
+
+def _write_any_name() -> None:
+    """Let letters that the terminal does not have appear as their codes: a finished run must not end there."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
 
 
 def _report(error: Exception, status: Exit) -> int:

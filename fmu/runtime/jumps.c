@@ -90,8 +90,9 @@ static bool stuck_in_time(Engine *engine, size_t jump, double t)
 {
     return problem(engine, ENDED_ZENO,
                    "Zeno: time events, the last of them '%s', were taken more than %zu times at t = %.17g s; the next "
-                   "time must lie after the present one. Remedy: let the jump map move the time on past it, or start "
-                   "with the next time to come.",
+                   "time must lie after the present one. Remedy: let the jump map move the time on past it; where a run "
+                   "starts later than its clock, declare the clock's state with computed=True and let start_map give "
+                   "the next time to come.",
                    NAME_AT(engine->model, engine->model->jumps[jump].name), time_jumps_allowed(engine), t);
 }
 

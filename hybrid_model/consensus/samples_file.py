@@ -60,7 +60,7 @@ def read_samples(path: Path, edge_count: int) -> Samples:
 
 def _read_csv(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     rows: list[list[float]] = []
-    with path.open(newline="", encoding="utf-8") as file:
+    with path.open(newline="", encoding="utf-8-sig") as file:
         for number, cells in enumerate(_csv_rows(file, path), start=1):
             if not cells:
                 continue

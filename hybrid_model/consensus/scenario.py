@@ -126,7 +126,7 @@ def _load_file(path: Path) -> Scenario:
 
 def _parse(source: str, content: bytes, folder: Path = Path()) -> Scenario:
     try:
-        entries = tomllib.loads(content.decode("utf-8"))
+        entries = tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise ScenarioError(f"{source} is not a text in UTF-8: byte {error.start} cannot be decoded.") from error
     except ValueError as error:

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from catalogue import cases
 
 from hybrid_model.models import BouncingBall
 
@@ -97,3 +98,22 @@ def test_other_versions_and_kinds_in_fmpy_end_as_well(fmi, kind, exported):
         # CVode's own relative tolerance is 1e-5 there.
         assert time == pytest.approx(ACCUMULATION, abs=1e-3)
         assert lowest >= -1e-9
+
+
+LATE = """
+import sys, fmpy
+try:
+    fmpy.simulate_fmu(sys.argv[1], start_time=1e6, stop_time=1e6 + 1)
+except Exception as error:
+    print("refused")
+"""
+
+
+def test_a_run_that_starts_later_than_its_clock_names_the_remedy(exported):
+    """Samples are due at 0, 0.13, ... s, which is millions of them at 1e6 s."""
+    path = exported(cases()["analog_digital_loop"].automaton, "analog_digital_loop")
+    done = subprocess.run(
+        [sys.executable, "-c", LATE, str(path)], capture_output=True, text=True, timeout=60, check=True
+    )
+    assert "declare the clock's state with computed=True and let start_map give the next time to come." in done.stdout
+    assert done.stdout.strip().endswith("refused")

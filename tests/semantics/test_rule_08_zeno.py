@@ -122,6 +122,24 @@ def test_fast_time_events_are_the_authors_own_and_no_accumulation():
     assert len(arc.jumps) in (200, 201)
 
 
+def test_a_run_that_starts_later_than_its_clock_names_the_remedy():
+    class Clock(hm.HybridAutomaton):
+        n = hm.DiscreteState(0.0, output=True)
+        transitions = (hm.TimeEvent("tick", lambda self, s: 0.125 * s.n, lambda self, s: {"n": s.n + 1.0}),)
+
+    class Punctual(Clock):
+        n = hm.DiscreteState(computed=True)
+
+        def start_map(self, s):
+            return {"n": np.ceil(s.t / 0.125)}
+
+    arc = hm.simulate(Clock(), 1e6 + 1.0, t_start=1e6)
+    assert arc.stop is hm.Stop.ZENO
+    assert "declare the clock's state with computed=True and let start_map give the next time to come." in arc.message
+    # Ticks at 1e6, 1e6 + 1/8, ..., 1e6 + 1 s.
+    assert len(hm.simulate(Punctual(), 1e6 + 1.0, t_start=1e6).jumps) == 9
+
+
 def test_a_guard_with_other_numbers_decides_otherwise():
     arc = hm.simulate(BouncingBall(), 5.0, zeno=hm.ZenoGuard(remainder=0.1))
     assert arc.stop is hm.Stop.ZENO
