@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.errors import CosimError
-from cosim.slave import Port, Slave, Step, Update
+from cosim.errors import CosimError, MisfitError
+from cosim.slave import Port, Slave, Step, Update, Value
 from hybrid_model import Automaton, Execution, Solver
 from hybrid_model.automaton_block import AutomatonBlock
 from hybrid_model.errors import SchedulingError
@@ -47,6 +47,7 @@ class AutomatonSlave(Slave):
         super().__init__(name, ports[Kind.INPUT], outputs, [clock.name for clock in automaton.clocks])
         self.automaton = automaton
         self._solver = solver
+        self._whole = {e for v in automaton.variables if v.integer for e in element_names(v)}
         self._names = [element for kind in Kind for element in layout.names(kind)]
         self._predictable = all(port.discrete for port in ports[Kind.INPUT])
         self._starts: dict[str, float] = {}
@@ -57,12 +58,16 @@ class AutomatonSlave(Slave):
         """See `Slave.variable_names`."""
         return self._names
 
-    def set(self, name: str, value: float) -> None:
+    def set(self, name: str, value: Value) -> None:
         """See `Slave.set`."""
         if name not in self._names:
             raise self.unknown(name)
+        if isinstance(value, (str, bytes)):
+            raise MisfitError(f"{self.name}.{name} is set to {value!r}: set a number.")
         if not np.isfinite(value):
-            raise CosimError(f"{self.name}.{name} is set to {value}: set a finite number.")
+            raise MisfitError(f"{self.name}.{name} is set to {value}: set a finite number.")
+        if name in self._whole and value != round(value):
+            raise MisfitError(f"{self.name}.{name} is set to {value}, but it is an integer: set a whole number.")
         if self._block is None:
             self._starts[name] = value
         else:

@@ -44,16 +44,16 @@ class Fmi2Instance(FmuInstance):
         """See `FmuInstance.set`."""
         getattr(self.fmu, f"set{_access(variable)}")([variable.valueReference], values)
 
-    def step(self, t: float, t_next: float) -> Advance:
+    def step(self, t: float, size: float) -> Advance:
         """See `FmuInstance.step`."""
         try:
-            self.fmu.doStep(t, t_next - t)
+            self.fmu.doStep(t, size)
         except FMICallException as error:
             if error.status != fmi2Discard:
                 raise
             ended = self.fmu.getBooleanStatus(fmi2Terminated)
             return Advance(self.fmu.getRealStatus(fmi2LastSuccessfulTime), False, ended, True)
-        return Advance(t_next, False, False, False)
+        return Advance(t + size, False, False, False)
 
     def save(self) -> Any:
         """See `FmuInstance.save`."""

@@ -38,9 +38,9 @@ class Fmi3Instance(FmuInstance):
         """See `FmuInstance.set`."""
         getattr(self.fmu, f"set{_access(variable)}")([variable.valueReference], values)
 
-    def step(self, t: float, t_next: float) -> Advance:
+    def step(self, t: float, size: float) -> Advance:
         """See `FmuInstance.step`."""
-        event, terminate, early, reached = self.fmu.doStep(t, t_next - t)
+        event, terminate, early, reached = self.fmu.doStep(t, size)
         return Advance(reached, event, terminate, early)
 
     def save(self) -> Any:
@@ -67,6 +67,14 @@ class Fmi3Instance(FmuInstance):
         """See `FmuInstance.update`."""
         again, terminate, _, _, defined, time = self.fmu.updateDiscreteStates()
         return again, terminate, time if defined else None
+
+    def enter_configuration(self) -> None:
+        """See `FmuInstance.enter_configuration`."""
+        self.fmu.enterConfigurationMode()
+
+    def exit_configuration(self) -> None:
+        """See `FmuInstance.exit_configuration`."""
+        self.fmu.exitConfigurationMode()
 
     def enter_event_mode(self) -> None:
         """See `FmuInstance.enter_event_mode`."""

@@ -83,8 +83,8 @@ class FmuInstance(ABC):
         """Write all elements of a variable."""
 
     @abstractmethod
-    def step(self, t: float, t_next: float) -> Advance:
-        """Step from `t` towards `t_next`."""
+    def step(self, t: float, size: float) -> Advance:
+        """Step from `t` towards `t + size`."""
 
     @abstractmethod
     def save(self) -> Any:
@@ -102,7 +102,15 @@ class FmuInstance(ABC):
     def free(self) -> None:
         """Free the instance; the binary stays loaded."""
 
-    # Events: of FMI 3.0 only.
+    # Structural parameters and events: of FMI 3.0 only.
+
+    def enter_configuration(self) -> None:
+        """Go to the mode in which structural parameters are set."""
+        raise self._no_configuration()
+
+    def exit_configuration(self) -> None:
+        """Leave that mode."""
+        raise self._no_configuration()
 
     def ticks(self, references: Sequence[int]) -> list[bool]:
         """Return which clocks tick."""
@@ -119,6 +127,9 @@ class FmuInstance(ABC):
     def enter_step_mode(self) -> None:
         """Go from event mode to step mode."""
         raise self._no_events()
+
+    def _no_configuration(self) -> CosimError:
+        return CosimError(f"{self.name} has no configuration mode: FMI 2.0 knows no structural parameters.")
 
     def _no_events(self) -> CosimError:
         return CosimError(f"{self.name} has no event mode: use the fixed-step master.")

@@ -12,13 +12,15 @@ from typing import Any
 
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import fmi3OK, fmi3Warning
+from fmpy.model_description import ValidationError
 
-from cosim.errors import CosimError
+from cosim.errors import CosimError, MisfitError
 from cosim.fmi2_instance import Fmi2Instance
 from cosim.fmi3_instance import Fmi3Instance
 from cosim.fmu_instance import FmuInstance
-from cosim.fmu_variables import INTEGERS, NUMBERS, elements, ports, size
-from cosim.slave import Slave, Step, Termination, Update
+from cosim.fmu_values import exact, parsed, require_within
+from cosim.fmu_variables import STRUCTURAL, FmuVariables
+from cosim.slave import Slave, Step, Termination, Update, Value
 from fmu.check.archive import Archive
 from fmu.importer.folders import temporary_folder
 from fmu.importer.loading import read_description
@@ -46,6 +48,8 @@ class FmuSlave(Slave):
         Name in the system.
     path : str or Path
         The FMU.
+    validate : bool
+        Whether to hold its description against the schema and fmpy's checks.
 
     Raises
     ------
@@ -54,9 +58,14 @@ class FmuSlave(Slave):
         `start`, if it has no binary for this machine.
     """
 
-    def __init__(self, name: str, path: str | Path) -> None:
+    def __init__(self, name: str, path: str | Path, *, validate: bool = True) -> None:
         try:
-            description = read_description(path)
+            description = read_description(path, validate=validate)
+        except ValidationError as error:
+            raise CosimError(
+                f"{name}: {path} cannot be read as an FMU: {error}\n`hybrid-fmu validate` says more; validate=False "
+                "(--no-validate) goes on all the same."
+            ) from error
         except Exception as error:
             raise CosimError(f"{name}: {path} cannot be read as an FMU: {error}") from error
         self._kind = _kind(description)
@@ -65,60 +74,64 @@ class FmuSlave(Slave):
                 f"{name}: {path} is not an FMI 2.0 or 3.0 Co-Simulation FMU (it says FMI {description.fmiVersion}, "
                 f"{_interfaces(description)}): export it as one."
             )
-        self._variables = {variable.name: variable for variable in description.modelVariables}
-        numbers = [variable for variable in description.modelVariables if variable.type in NUMBERS]
-        self._elements = {name: place for variable in numbers for name, place in elements(variable)}
+        self._variables = FmuVariables(description)
         self._clock_references = {
             variable.name: variable.valueReference
             for variable in description.modelVariables
             if variable.type == "Clock" and variable.causality == "output"
         }
-        super().__init__(
-            name,
-            [port for variable in numbers if variable.causality == "input" for port in ports(variable)],
-            [port for variable in numbers if variable.causality == "output" for port in ports(variable)],
-            list(self._clock_references),
-        )
-        self.has_event_mode = bool(getattr(description.coSimulation, "hasEventMode", False))
-        self.can_restore = bool(description.coSimulation.canGetAndSetFMUstate)
+        inputs, outputs = self._variables.ports("input"), self._variables.ports("output")
+        super().__init__(name, inputs, outputs, list(self._clock_references))
+        interface = description.coSimulation
+        self.has_event_mode = bool(getattr(interface, "hasEventMode", False))
+        self.can_restore = bool(interface.canGetAndSetFMUstate)
+        self.variable_step = bool(interface.canHandleVariableCommunicationStepSize)
         # FMI asks of others that they name their time events; the events on their states come unannounced.
         self.foresees = str(description.generationTool).startswith(OWN_TOOL)
-        experiment = description.defaultExperiment
-        self.default_stop_time = float(experiment.stopTime) if experiment and experiment.stopTime else None
+        self._read_experiment(description)
         self._messages: deque[tuple[int, str]] = deque(maxlen=MESSAGES)
         self._description = description
         self._path = path
         self._loaded: FmuInstance | None = None
         self._running: FmuInstance | None = None
-        self._starts: dict[str, float] = {}
+        self._starts: dict[str, Any] = {}
         self._getters: dict[str, tuple[Callable[..., list[Any]], tuple[Any, ...], int]] = {}
+        self._arrays: dict[str, list[Any]] = {}
+        self._step_size = math.nan
 
     @property
     def variable_names(self) -> list[str]:
         """See `Slave.variable_names`."""
-        return list(self._elements)
+        return list(self._variables.places)
 
-    def set(self, name: str, value: float) -> None:
+    def set(self, name: str, value: Value) -> None:
         """See `Slave.set`."""
-        if name not in self._elements:
-            raise self.unknown(name)
-        if not math.isfinite(value):
-            raise CosimError(f"{self.name}.{name} is set to {value}: set a finite number.")
-        if self._running is None:
-            self._starts[name] = value
-        else:
-            self._write(name, value)
+        variable, _ = self._place(name)
+        held = exact(variable, value, f"{self.name}.{name}")
+        if self._running is not None:
+            if variable.causality == STRUCTURAL:
+                raise MisfitError(f"{self.name}.{name} is a structural parameter: set it before the run.")
+            self._write(name, held)
+            return
+        require_within(variable, held, f"{self.name}.{name}")
+        self._starts[name] = held
+        if variable.causality == STRUCTURAL:
+            self._resize(variable, held)
 
-    def get(self, name: str) -> float:
-        """See `Slave.get`."""
+    def parse(self, name: str, text: str) -> Value:
+        """See `Slave.parse`."""
+        return parsed(self._place(name)[0], text, f"{self.name}.{name}")
+
+    def get(self, name: str) -> Any:
+        """See `Slave.get`; whole numbers are int, Booleans bool."""
         if name not in self._getters:
-            if name not in self._elements:
-                raise self.unknown(name)
-            whole, index = self._elements[name]
-            variable = self._variables[whole]
-            self._getters[name] = *self._instance.getter(variable, size(variable)), index
+            variable, index = self._place(name)
+            self._getters[name] = *self._instance.getter(variable, self._variables.size(variable)), index
         getter, arguments, index = self._getters[name]
-        return float(self._call(getter, *arguments)[index])
+        try:
+            return self._call(getter, *arguments)[index]
+        except (UnicodeDecodeError, AttributeError) as error:
+            raise CosimError(f"{self.name}.{name} holds no text in UTF-8, as FMI wants it.") from error
 
     def load(self) -> FmuInstance:
         """Load the FMU's binary, once for all runs; `start` does it if nobody has."""
@@ -146,8 +159,11 @@ class FmuSlave(Slave):
         except Exception as error:
             raise CosimError(f"{self.name} refuses to be instantiated: {self._said()}") from error
         self._running = loaded
+        self._arrays.clear()
+        self._configure()
         for name, value in self._starts.items():
-            self._write(name, value)
+            if self._place(name)[0].causality != STRUCTURAL:
+                self._write(name, value)
         self._call(loaded.enter_initialization, t_start, t_stop)
 
     def begin(self) -> None:
@@ -170,9 +186,10 @@ class FmuSlave(Slave):
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Slave.step`."""
-        instance = self._instance
+        instance, rigid = self._instance, not self.variable_step
         for _ in range(MAX_PARTS):
-            told, event, terminate, early = self._call(instance.step, t, t_next)
+            size = self._constant(t_next - t) if rigid else t_next - t
+            told, event, terminate, early = self._call(instance.step, t, size)
             # The last successful time is where an FMU is only if it returned early (FMI 3.0.2 section 4.2).
             reached = told if (early or terminate) and not _are_one(told, t_next) else t_next
             if event or terminate or reached >= t_next:
@@ -184,10 +201,13 @@ class FmuSlave(Slave):
 
     def save(self) -> Any:
         """See `Slave.save`."""
+        if not self.can_restore:
+            raise CosimError(f"{self.name} cannot save its state: its canGetAndSetFMUState is false.")
         return self._call(self._instance.save)
 
     def restore(self, state: Any) -> None:
         """See `Slave.restore`."""
+        self._arrays.clear()
         self._call(self._instance.restore, state)
 
     def release(self, state: Any) -> None:
@@ -212,16 +232,59 @@ class FmuSlave(Slave):
         active = self._call(self._instance.ticks, list(self._clock_references.values()))
         return tuple(clock for clock, ticked in zip(self.clocks, active, strict=True) if ticked)
 
-    def _write(self, name: str, value: float) -> None:
-        whole, index = self._elements[name]
-        variable = self._variables[whole]
-        number = round(value) if variable.type in INTEGERS else float(value)
-        values = [number]
-        if size(variable) > 1:
-            getter, arguments = self._instance.getter(variable, size(variable))
-            values = list(self._call(getter, *arguments))
-            values[index] = number
-        self._call(self._instance.set, variable, values)
+    def _place(self, name: str) -> tuple[Any, int]:
+        try:
+            return self._variables.places[name]
+        except KeyError:
+            raise self.unknown(name) from None
+
+    def _resize(self, variable: Any, value: int) -> None:
+        self._variables.resize(variable, value)
+        self._getters.clear()
+        self.inputs = {port.name: port for port in self._variables.ports("input")}
+        self.outputs = {port.name: port for port in self._variables.ports("output")}
+
+    def _configure(self) -> None:
+        """Set structural parameters, in the mode that FMI 3.0 has for them."""
+        structural = [name for name in self._starts if self._place(name)[0].causality == STRUCTURAL]
+        if structural:
+            self._call(self._instance.enter_configuration)
+            for name in structural:
+                self._write(name, self._starts[name])
+            self._call(self._instance.exit_configuration)
+
+    def _constant(self, size: float) -> float:
+        """Return the length of a step that may not vary, not by rounding either."""
+        if not math.isclose(size, self._step_size, rel_tol=1e-9):
+            self._step_size = size
+        return self._step_size
+
+    def _write(self, name: str, value: Any) -> None:
+        variable, index = self._place(name)
+        values = [value]
+        if variable.dimensions:
+            values = self._whole(variable)
+            values[index] = value
+        try:
+            self._call(self._instance.set, variable, values)
+        except CosimError as error:
+            raise CosimError(f"{error} It was to set {name!r} to {value!r}.") from error
+
+    def _whole(self, variable: Any) -> list[Any]:
+        """Return the elements of an array as they are; FMI allows no reading between setting and stepping."""
+        if variable.name not in self._arrays:
+            getter, arguments = self._instance.getter(variable, self._variables.size(variable))
+            self._arrays[variable.name] = list(self._call(getter, *arguments))
+        return self._arrays[variable.name]
+
+    def _read_experiment(self, description: Any) -> None:
+        given = description.defaultExperiment
+        if given is not None:
+            self.default_start_time = _seconds(given.startTime)
+            self.default_stop_time = _seconds(given.stopTime)
+            self.default_step = _seconds(given.stepSize)
+        if self.default_step is None:
+            self.default_step = _seconds(getattr(description.coSimulation, "fixedInternalStepSize", None))
 
     def _hear(self, status: int, message: str) -> None:
         self._messages.append((status, message))
@@ -250,8 +313,21 @@ def _kind(description: Any) -> type[FmuInstance] | None:
     return Fmi3Instance if description.fmiVersion.startswith("3.") else None
 
 
+def _seconds(text: str | None) -> float | None:
+    """Return a time of the description, if it says a usable one."""
+    try:
+        value = math.nan if text is None else float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
 def _interfaces(description: Any) -> str:
-    offered = {"Co-Simulation": description.coSimulation, "Model Exchange": description.modelExchange}
+    offered = {
+        "Co-Simulation": description.coSimulation,
+        "Model Exchange": description.modelExchange,
+        "Scheduled Execution": description.scheduledExecution,
+    }
     return " and ".join(name for name, interface in offered.items() if interface is not None) or "no interface"
 
 

@@ -7,36 +7,68 @@ from typing import Any
 
 import numpy as np
 
+from cosim.fmu_values import DISCRETE, TYPES
 from cosim.slave import Port
 
-INTEGERS = {
-    "Integer",
-    "Boolean",
-    "Enumeration",
-    *(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64)),
-}
-"""Types of fmpy that hold whole numbers."""
-
-NUMBERS = {"Real", "Float32", "Float64", *INTEGERS}
-"""Types of fmpy that hold numbers."""
+KINDS = {"String": "text", "Binary": "bytes"}
+"""What ports of these types carry; those of all others carry numbers."""
+STRUCTURAL = "structuralParameter"
 
 
-def elements(variable: Any) -> Iterator[tuple[str, tuple[str, int]]]:
-    """Yield the scalars of a variable, counted from 1 row by row, with the place of each."""
-    if not variable.dimensions:
-        yield variable.name, (variable.name, 0)
-        return
-    for index, place in enumerate(np.ndindex(*variable.shape)):
-        yield f"{variable.name}[{','.join(str(i + 1) for i in place)}]", (variable.name, index)
+class FmuVariables:
+    """The scalars of an FMU; those of arrays are counted from 1 row by row, ``w[1,2]``.
 
+    Parameters
+    ----------
+    description : fmpy.model_description.ModelDescription
 
-def size(variable: Any) -> int:
-    """Return the number of elements."""
-    return int(np.prod(variable.shape)) if variable.dimensions else 1
+    Attributes
+    ----------
+    places : dict
+        Name of a scalar -> its variable, and its place among the variable's elements.
+    """
 
+    def __init__(self, description: Any) -> None:
+        self._variables = [variable for variable in description.modelVariables if variable.type in TYPES]
+        # Arrays have the sizes that structural parameters say.
+        self._sizes = {v.valueReference: int(v.start) for v in self._variables if v.causality == STRUCTURAL and v.start}
+        self._count()
 
-def ports(variable: Any) -> list[Port]:
-    """Return the scalars as inputs or outputs of a slave."""
-    # FMI has no integer and no Boolean that changes along flows.
-    discrete = variable.variability == "discrete" or variable.type in INTEGERS
-    return [Port(name, variable.unit or "", discrete) for name, _ in elements(variable)]
+    def resize(self, parameter: Any, value: int) -> None:
+        """Give a structural parameter a value, and with it the arrays that have their sizes from it."""
+        self._sizes[parameter.valueReference] = value
+        self._count()
+
+    def size(self, variable: Any) -> int:
+        """Return the number of elements of a variable."""
+        return int(np.prod(self._shape(variable)))
+
+    def ports(self, causality: str) -> list[Port]:
+        """Return the inputs or the outputs."""
+        return [port for v in self._variables if v.causality == causality for port in self._ports(v)]
+
+    def _count(self) -> None:
+        self.places = {
+            name: (variable, place) for variable in self._variables for place, name in enumerate(self._names(variable))
+        }
+
+    def _shape(self, variable: Any) -> tuple[int, ...]:
+        return tuple(
+            self._sizes.get(dimension.valueReference, given)
+            for dimension, given in zip(variable.dimensions, variable.shape or (), strict=True)
+        )
+
+    def _names(self, variable: Any) -> Iterator[str]:
+        if not variable.dimensions:
+            yield variable.name
+            return
+        for place in np.ndindex(*self._shape(variable)):
+            yield f"{variable.name}[{','.join(str(i + 1) for i in place)}]"
+
+    def _ports(self, variable: Any) -> Iterator[Port]:
+        # FMI has nothing but floating-point numbers that changes along flows.
+        discrete = variable.variability == "discrete" or variable.type in DISCRETE
+        declared = variable.declaredType
+        unit = variable.unit or (declared.unit if declared else None) or ""
+        for name in self._names(variable):
+            yield Port(name, unit, discrete, KINDS.get(variable.type, "number"))

@@ -5,11 +5,15 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from cosim.errors import MisfitError
 from hybrid_model.blocks import Block, Step, Termination, Update
 
-__all__ = ["Port", "Slave", "Step", "Termination", "Update"]
+__all__ = ["Port", "Slave", "Step", "Termination", "Update", "Value"]
+
+Value = float | str | bytes
+"""What a variable holds: a number, an int or bool exactly as such, a text, or bytes."""
 
 
 @dataclass(frozen=True)
@@ -22,11 +26,14 @@ class Port:
         As the block declares them.
     discrete : bool
         Whether it changes only at events.
+    kind : str
+        What it carries: ``number``, ``text`` or ``bytes``.
     """
 
     name: str
     unit: str = ""
     discrete: bool = False
+    kind: str = "number"
 
 
 class Slave(Block):
@@ -47,8 +54,12 @@ class Slave(Block):
 
     has_event_mode: bool
     """Whether events can be handled by the master, at their exact times."""
-    can_restore: bool
-    """Whether `save` and `restore` work."""
+    variable_step: bool = True
+    """Whether steps may differ in length."""
+    default_start_time: float | None = None
+    default_stop_time: float | None = None
+    default_step: float | None = None
+    """Times in s that the block proposes for a run: start, stop, and the step of communication."""
 
     def __init__(self, name: str, inputs: Sequence[Port], outputs: Sequence[Port], clocks: Sequence[str]) -> None:
         self.name = name
@@ -73,8 +84,31 @@ class Slave(Block):
         """Leave initialization mode: into event mode if the master handles events, else into step mode."""
 
     @abstractmethod
-    def set(self, name: str, value: float) -> None:
-        """Set an input, or before `start` a start value or parameter."""
+    def set(self, name: str, value: Value) -> None:
+        """Set an input, or before `start` a start value or parameter.
+
+        Raises
+        ------
+        MisfitError
+            If there is no such variable, or it does not hold the value exactly.
+        """
+
+    @abstractmethod
+    def get(self, name: str) -> Any:
+        """Return the present value of a scalar variable: a `Value`."""
+
+    def parse(self, name: str, text: str) -> Value:
+        """Return the value of a variable that a text says, for `set`.
+
+        Raises
+        ------
+        MisfitError
+            If it says none of the variable's type.
+        """
+        try:
+            return float(text)
+        except ValueError:
+            raise MisfitError(f"{self.name}.{name} is set to {text!r}: give a number.") from None
 
     @abstractmethod
     def close(self) -> None:

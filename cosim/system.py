@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from cosim.errors import MisfitError
 from cosim.slave import Port, Slave
@@ -30,13 +31,14 @@ class System:
     slaves : sequence of Slave
         With distinct names; the order is the order in which simultaneous events are handled.
     connections : mapping
-        ``"slave.input"`` -> ``"slave.output"``, or a sequence of such names for the elements of a vector input; inputs
-        not named keep their start values.
+        ``"slave.input"`` -> ``"slave.output"``; for vectors too, if both have the same elements, or to a sequence of
+        names for the elements. Inputs not named keep their start values.
 
     Raises
     ------
     MisfitError
-        For unknown names, two slaves of one name, units that differ, or a continuous signal on a discrete input.
+        For unknown names, two slaves of one name, units or elements that differ, a continuous signal on a discrete
+        input, or text on an input for numbers.
     """
 
     def __init__(self, slaves: Sequence[Slave], connections: Mapping[str, str | Sequence[str]]) -> None:
@@ -47,7 +49,7 @@ class System:
         self.connections = tuple(
             self._connection(target, source)
             for vector, sources in connections.items()
-            for target, source in _elements(vector, sources)
+            for target, source in self._elements(vector, sources)
         )
         self._refuse_doubles()
         self._from: dict[str, list[Connection]] = {name: [] for name in self.slaves}
@@ -63,7 +65,7 @@ class System:
         """Names of all outputs, ``slave.output``."""
         return list(self._outputs)
 
-    def get(self, name: str) -> float:
+    def get(self, name: str) -> Any:
         """Return the present value of the output ``slave.output``.
 
         Raises
@@ -88,6 +90,8 @@ class System:
             raise MisfitError(
                 f"{source} is in {output_port.unit!r}, but {target} is in {input_port.unit!r}: convert one."
             )
+        if input_port.kind != output_port.kind:
+            raise MisfitError(f"{source} carries {output_port.kind}, but {target} takes {input_port.kind}.")
         if input_port.discrete and not output_port.discrete:
             raise MisfitError(
                 f"{source} changes along flows, but {target} is a discrete input, which may change only at events: "
@@ -103,18 +107,47 @@ class System:
                 raise MisfitError(f"{first} and {connection} drive one input: leave one of them out.")
 
     def _find(self, scoped: str, what: str) -> tuple[Slave, Port]:
+        ports = self._ports(scoped, what)
+        name = self._owner(scoped)[1]
+        if name not in ports:
+            owner = self._owner(scoped)[0].name
+            raise MisfitError(f"{scoped} is not an {what}; the {what}s of {owner} are {', '.join(ports) or 'none'}.")
+        return self._owner(scoped)[0], ports[name]
+
+    def _owner(self, scoped: str) -> tuple[Slave, str]:
+        """Split the name of a variable into its slave and its own name."""
         owner = next((n for n in sorted(self.slaves, key=len, reverse=True) if scoped.startswith(n + ".")), None)
         if owner is None:
             raise MisfitError(f"{scoped!r} names no slave; the slaves are {', '.join(self.slaves)}.")
-        slave = self.slaves[owner]
-        ports = slave.inputs if what == "input" else slave.outputs
-        name = scoped[len(owner) + 1 :]
-        if name not in ports:
-            raise MisfitError(f"{scoped} is not an {what}; the {what}s of {owner} are {', '.join(ports) or 'none'}.")
-        return slave, ports[name]
+        return self.slaves[owner], scoped[len(owner) + 1 :]
+
+    def _ports(self, scoped: str, what: str) -> Mapping[str, Port]:
+        slave = self._owner(scoped)[0]
+        return slave.inputs if what == "input" else slave.outputs
+
+    def _elements(self, target: str, sources: str | Sequence[str]) -> list[tuple[str, str]]:
+        """Return the elements of an input with the outputs they are connected to."""
+        if not isinstance(sources, str):
+            return [(f"{target}[{k}]", source) for k, source in enumerate(sources, start=1)]
+        places = self._places(target, "input")
+        given = self._places(sources, "output")
+        if not places and not given:
+            return [(target, sources)]
+        if places != given:
+            raise MisfitError(
+                f"{target} has {_number(places)} and {sources} {_number(given)}: connect arrays of one shape, or name "
+                "the output of each element in a list."
+            )
+        return [(target + place, sources + place) for place in places]
+
+    def _places(self, scoped: str, what: str) -> list[str]:
+        """Return the places of an array's elements, ``[1]``, in order; none for a scalar."""
+        _, name = self._owner(scoped)
+        ports = self._ports(scoped, what)
+        if name in ports:
+            return []
+        return [port[len(name) :] for port in ports if port.startswith(name + "[")]
 
 
-def _elements(target: str, sources: str | Sequence[str]) -> list[tuple[str, str]]:
-    if isinstance(sources, str):
-        return [(target, sources)]
-    return [(f"{target}[{k}]", source) for k, source in enumerate(sources, start=1)]
+def _number(places: Sequence[str]) -> str:
+    return f"the elements {places[0]} to {places[-1]}" if places else "no elements"

@@ -7,6 +7,7 @@ import enum
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 
 class UsageError(ValueError):
@@ -34,7 +35,24 @@ def progress(text: str) -> None:
 
 
 def start_values(given: Sequence[str]) -> dict[str, float]:
-    """Read ``NAME=VALUE`` options.
+    """Read ``NAME=VALUE`` options with numbers.
+
+    Raises
+    ------
+    UsageError
+        If one is not of that form.
+    """
+    values = {}
+    for name, text in given_values(given).items():
+        try:
+            values[name] = float(text)
+        except ValueError:
+            raise UsageError(f"--start-value '{name}={text}' is not NAME=VALUE with a number for VALUE.") from None
+    return values
+
+
+def given_values(given: Sequence[str]) -> dict[str, str]:
+    """Split ``NAME=VALUE`` options, whatever the values are.
 
     Raises
     ------
@@ -43,20 +61,21 @@ def start_values(given: Sequence[str]) -> dict[str, float]:
     """
     values = {}
     for item in given:
-        name, equals, value = item.partition("=")
-        try:
-            values[name] = float(value)
-        except ValueError:
-            equals = ""
+        name, equals, text = item.partition("=")
         if not equals or not name:
             raise UsageError(f"--start-value {item!r} is not NAME=VALUE with a number for VALUE.")
+        values[name] = text
     return values
 
 
-def write_csv(path: Path, times: Sequence[float], signals: Mapping[str, Sequence[float]]) -> None:
-    """Write signals over time as comma-separated values, the time first."""
+def write_csv(path: Path, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> None:
+    """Write signals over time as comma-separated values, the time first; Booleans as 0 and 1, bytes in base 16."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["time", *signals])
-        writer.writerows(zip(times, *signals.values(), strict=True))
+        writer.writerows([_cell(value) for value in row] for row in zip(times, *signals.values(), strict=True))
+
+
+def _cell(value: Any) -> Any:
+    return int(value) if isinstance(value, bool) else value.hex() if isinstance(value, bytes) else value

@@ -83,6 +83,11 @@ def _require_discrete(system: System) -> None:
     for slave in system.slaves.values():
         if not slave.has_event_mode:
             raise MisfitError(f"{slave.name} has no event mode: use the fixed-step master.")
+        if not slave.variable_step:
+            raise MisfitError(
+                f"{slave.name} takes steps of one length only (canHandleVariableCommunicationStepSize is false), and "
+                "events come at any distance: use the fixed-step master."
+            )
     for connection in system.connections:
         port = system.slaves[connection.source].outputs[connection.output]
         if not port.discrete:

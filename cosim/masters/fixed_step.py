@@ -5,14 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from cosim.errors import CosimError
+from cosim.errors import CosimError, MisfitError
 from cosim.masters.start import outputs, require_times, sample, sample_end, start_slaves
 from cosim.result import CosimResult
 from cosim.system import System
 
+ROUNDING = 1e-9
+"""Relative rounding of a number of steps."""
+
 
 def run_fixed_step(
-    system: System, t_stop: float, step: float, *, t_start: float = 0.0, record: Sequence[str] = ()
+    system: System,
+    t_stop: float,
+    step: float,
+    *,
+    t_start: float = 0.0,
+    record: Sequence[str] = (),
+    output_interval: float | None = None,
 ) -> CosimResult:
     """Run a system with a fixed communication step; slaves handle their events inside.
 
@@ -27,7 +36,10 @@ def run_fixed_step(
     step : float
         Communication step in s; the last one is shorter if it does not divide the run.
     record : sequence of str
-        Outputs, ``slave.output``, to keep at every communication point.
+        Outputs, ``slave.output``, to keep: before signals are exchanged, so as each slave gave them.
+    output_interval : float, optional
+        Keep them at multiples of this time in s, which is a multiple of the step, and at the end; default: at every
+        communication point.
 
     Returns
     -------
@@ -38,22 +50,28 @@ def run_fixed_step(
     ------
     CosimError
         If a slave fails or the times make no sense.
+    MisfitError
+        If the last step is shorter, and a slave takes steps of one length only.
     """
     require_times(t_start, t_stop, step, "communication step")
+    require_times(t_start, t_stop, output_interval, "output interval")
     if isinstance(record, (bool, str)):
         raise CosimError(f"record is {record!r}: give a list of outputs, for all of them system.output_names.")
+    count = math.ceil((t_stop - t_start) / step * (1.0 - 1e-14))
+    _require_constant(system, t_stop - t_start, count, step)
+    every = 1 if output_interval is None else _steps_between(output_interval, step)
     result = CosimResult(t=t_start)
     try:
         start_slaves(system, t_start, t_stop, events=False)
         sample(system, result, t_start, record)
         # Time by index: adding up steps would drift (rule 9).
-        count = math.ceil((t_stop - t_start) / step * (1.0 - 1e-14))
-        for k in range(count):
-            t_next = t_stop if k == count - 1 else t_start + (k + 1) * step
-            if not _step_all(system, result, t_next):
+        for k in range(1, count + 1):
+            if not _step_all(system, result, t_stop if k == count else t_start + k * step):
                 sample_end(system, result, result.t, record)
                 break
-            sample(system, result, t_next, record)
+            if k % every == 0 or k == count:
+                sample(system, result, result.t, record)
+            _exchange(system)
         result.final = outputs(system)
     finally:
         system.close()
@@ -68,8 +86,31 @@ def _step_all(system: System, result: CosimResult, t_next: float) -> bool:
             result.terminate(name, made.reached, made.terminated)
             return False
     result.t = t_next
+    return True
+
+
+def _exchange(system: System) -> None:
     # Read everything before writing anything: the order of slaves must not matter.
     values = [system.slaves[c.source].get(c.output) for c in system.connections]
     for connection, value in zip(system.connections, values, strict=True):
         system.slaves[connection.target].set(connection.input, value)
-    return True
+
+
+def _require_constant(system: System, length: float, count: int, step: float) -> None:
+    """Refuse a shorter last step if a slave takes steps of one length only."""
+    rigid = next((name for name, slave in system.slaves.items() if not slave.variable_step), None)
+    if rigid is not None and abs(length - count * step) > ROUNDING * length:
+        raise MisfitError(
+            f"{rigid} takes steps of one length only (canHandleVariableCommunicationStepSize is false), but a run of "
+            f"{length:.9g} s is no multiple of {step:.9g} s: end it {(count - 1) * step:.9g} or {count * step:.9g} s "
+            "after its start, or choose another step."
+        )
+
+
+def _steps_between(interval: float, step: float) -> int:
+    every = round(interval / step)
+    if every < 1 or abs(every * step - interval) > ROUNDING * interval:
+        raise CosimError(
+            f"the output interval is {interval} s, which is no multiple of the communication step, {step} s: give one."
+        )
+    return every

@@ -9,9 +9,12 @@ from cosim.errors import CosimError
 from cosim.result import CosimResult
 from cosim.system import System
 
+MOST_STEPS = 100_000_000
+"""Most steps of one run."""
+
 
 def require_times(t_start: float, t_stop: float, interval: float | None, what: str) -> None:
-    """Refuse times that are not finite, not in order, or a step that is not positive.
+    """Refuse times that are not finite or not in order, and steps that are not positive, too short or too many.
 
     Raises
     ------
@@ -22,6 +25,17 @@ def require_times(t_start: float, t_stop: float, interval: float | None, what: s
         raise CosimError(f"the run goes from {t_start} to {t_stop} s: give finite times, the stop after the start.")
     if interval is not None and not (math.isfinite(interval) and interval > 0):
         raise CosimError(f"the {what} is {interval} s: give a positive, finite number.")
+    latest = max(abs(t_start), abs(t_stop))
+    if interval is not None and interval < math.ulp(latest):
+        raise CosimError(
+            f"the {what} is {interval} s, but floating-point numbers lie {math.ulp(latest):.3g} s apart at t = "
+            f"{latest:.9g} s: give a longer one."
+        )
+    if interval is not None and (t_stop - t_start) / interval > MOST_STEPS:
+        raise CosimError(
+            f"a {what} of {interval} s makes {(t_stop - t_start) / interval:.3g} steps from {t_start:.9g} to "
+            f"{t_stop:.9g} s, and at most {MOST_STEPS} are made: give a longer one."
+        )
 
 
 def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool) -> None:

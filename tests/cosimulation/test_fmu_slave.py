@@ -56,7 +56,9 @@ STUCK, ENDS, FAILS, CRAWLS, DIES = 1, 2, 3, 4, 5
 def other(foreign_binary, tmp_path):
     """Somebody else's FMU, with what the description is to say."""
 
-    def write(version="2.0", kind="CoSimulation", guid="someone-else", member="binaries/linux64/other.so"):
+    variable = 'canHandleVariableCommunicationStepSize="true"'
+
+    def write(version="2.0", kind=f"CoSimulation {variable}", guid="someone-else", member="binaries/linux64/other.so"):
         path = tmp_path / "other.fmu"
         with zipfile.ZipFile(path, "w") as archive:
             archive.writestr("modelDescription.xml", DESCRIPTION.format(version=version, kind=kind, guid=guid))
@@ -188,7 +190,7 @@ def test_command_line_says_that_fmi2_has_no_event_mode(exported, capsys):
 def test_someone_elses_fmu_runs(other):
     slave = FmuSlave("other", other())
     assert (slave.has_event_mode, slave.can_restore, slave.default_stop_time) == (False, False, 2.0)
-    assert slave.variable_names == ["x", "rate", "limit", "behaviour", "steps", "level", "double_rate"]
+    assert slave.variable_names == ["x", "rate", "limit", "behaviour", "steps", "level", "double_rate", "note"]
     result = run(slave)
     # The FMU multiplies 20 factors, each rounded.
     assert result.final["other.x"] == pytest.approx(math.exp(-2.0), rel=1e-14)

@@ -13,6 +13,8 @@ class Sender(hm.HybridAutomaton):
     position = hm.State(0.0, unit="m", output=True)
     hidden = hm.State(0.0)
     sent = hm.DiscreteState(0.0, unit="m", output=True)
+    pair = hm.DiscreteState([1.0, 2.0], output=True)
+    three = hm.DiscreteState([1.0, 2.0, 3.0], output=True)
 
     def flow_map(self, s):
         return {"position": 1.0, "hidden": 0.0}
@@ -25,6 +27,7 @@ class Receiver(hm.HybridAutomaton):
     gain = hm.Input(0.0)
     gain2 = hm.Input(0.0)
     many = hm.Input([0.0, 0.0], discrete=True)
+    table = hm.Input([[0.0, 0.0]], discrete=True)
 
 
 def wire(connections):
@@ -58,6 +61,32 @@ def test_signals_that_do_not_fit_are_refused(target, source, sentence):
 def test_an_input_driven_twice_is_refused():
     with pytest.raises(MisfitError, match=r"sender.sent -> receiver.many\[1\] and sender.sent -> receiver.many\[1\]"):
         wire({"receiver.many": ["sender.sent", "sender.sent"], "receiver.many[1]": "sender.sent"})
+
+
+def test_vectors_of_one_shape_are_connected_by_their_names():
+    system = wire({"receiver.many": "sender.pair"})
+    assert [str(connection) for connection in system.connections] == [
+        "sender.pair[1] -> receiver.many[1]",
+        "sender.pair[2] -> receiver.many[2]",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("target", "source", "sentence"),
+    [
+        ("receiver.many", "sender.three", r"the elements \[1\] to \[2\] and sender.three the elements \[1\] to \[3\]"),
+        (
+            "receiver.table",
+            "sender.pair",
+            r"the elements \[1,1\] to \[1,2\] and sender.pair the elements \[1\] to \[2\]",
+        ),
+        ("receiver.many", "sender.sent", "sender.sent no elements: connect arrays of one shape, or name the output of"),
+        ("receiver.felt", "sender.pair", "receiver.felt has no elements"),
+    ],
+)
+def test_vectors_of_other_shapes_are_refused(target, source, sentence):
+    with pytest.raises(MisfitError, match=sentence):
+        wire({target: source})
 
 
 def test_names_that_begin_alike_are_told_apart():
