@@ -34,11 +34,11 @@ STATE_TOLERANCE = 1e-8
 class Simulation:
     """An Ecos simulation with FMUs by name."""
 
-    def __init__(self, fmus, step, wires=None, parameters=None):
+    def __init__(self, fmus, step, wires=None, parameters=None, hints=None):
         ecospy.EcosLib.set_log_level("off")
         self.structure = ecospy.EcosSimulationStructure()
         for name, path in fmus.items():
-            self.structure.add_model(name, str(path))
+            self.structure.add_model(name, str(path), (hints or {}).get(name))
         for port, source in (wires or {}).items():
             self.structure.make_real_connection(source.replace(".", "::", 1), port.replace(".", "::", 1))
         self.structure.add_parameter_set("given", parameters or {})
@@ -127,3 +127,15 @@ def test_ecos_goes_on_where_an_fmu_has_ended_its_run(fmi, exported, simulate):
     assert times == [0.5 * k for k in range(1, 9)]
     assert simulation.get("ball.time") == pytest.approx(arc.t[-1], abs=1e-7)
     assert simulation.get("ball.h") == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_a_step_size_hint_lets_an_fmu_run_ahead(fmi, exported, simulate):
+    """It gives the FMU steps of that length, the first one at once: leave it out."""
+    ball = exported(BouncingBall(), "ball", fmi, clocks=False)
+    simulation = simulate({"one": ball, "ahead": ball}, 0.1, hints={"ahead": 0.3})
+    times = []
+    for _ in range(4):
+        simulation.engine.step()
+        times.append([simulation.get(f"{name}.time") for name in ("one", "ahead")])
+    np.testing.assert_allclose(times, [[0.1, 0.3], [0.2, 0.3], [0.3, 0.3], [0.4, 0.6]], atol=1e-12)

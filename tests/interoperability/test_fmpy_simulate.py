@@ -183,3 +183,68 @@ def test_temperatures_can_be_given_in_degrees_celsius(fmi, kind, exported):
     assert result["T"][0] == 298.15
     # CVode's error of one step is 1e-10 of 300 K, and it makes some hundred.
     assert result["T"][-1] == pytest.approx(293.15 + 5.0 * np.exp(-0.1), abs=1e-5)
+
+
+ZENO = 2.5586
+"""Where the ball's impacts accumulate, to 1e-4 s: (1 + e)/(1 - e) sqrt(2 h/g)."""
+
+
+@pytest.mark.parametrize(
+    ("fmi", "kind", "options", "last"),
+    [
+        ("2.0", "ModelExchange", {}, ZENO),
+        ("3.0", "ModelExchange", {}, ZENO),
+        ("2.0", "CoSimulation", {}, ZENO),
+        ("3.0", "CoSimulation", {"use_event_mode": True, "early_return_allowed": True}, ZENO),
+        # The end of the step that it asked for, with the values of the end of the run.
+        ("3.0", "CoSimulation", {}, 3.0),
+    ],
+)
+def test_where_a_run_ends_by_itself_the_result_is_shorter(fmi, kind, options, last, exported):
+    """So compare the last time with the stop time."""
+    path = str(exported(BouncingBall(), "ball", fmi))
+    result = fmpy.simulate_fmu(
+        path, stop_time=4.0, output_interval=0.5, fmi_type=kind, output=["h"], relative_tolerance=1e-10, **options
+    )
+    assert result["time"][-1] == pytest.approx(last, abs=1e-4)
+    assert result["h"][-1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_names_that_it_does_not_record_are_left_out(exported):
+    """Clocks, and names that there are not."""
+    path = str(exported(BouncingBall(), "ball"))
+    result = fmpy.simulate_fmu(path, stop_time=0.1, output=["h", "impact", "hight"])
+    assert result.dtype.names == ("time", "h")
+
+
+class Follower(hm.HybridAutomaton):
+    """Adds up its input, and shows it."""
+
+    u = hm.Input(0.0)
+    x = hm.State(0.0, output=True)
+    y = hm.Output()
+
+    def flow_map(self, s):
+        return {"x": s.u}
+
+    def outputs(self, s):
+        return {"y": s.u}
+
+
+@pytest.mark.parametrize(("kind", "shown"), [("CoSimulation", [0.0]), ("ModelExchange", [0.0, 1.0])])
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_a_jump_in_a_table_of_inputs_is_shown_one_point_later_in_co_simulation(fmi, kind, shown, exported):
+    """What follows from the input is right: the state begins to rise at the jump."""
+    table = np.array([(0.0, 0.0), (0.5, 0.0), (0.5, 1.0), (1.0, 1.0)], dtype=[("time", float), ("u", float)])
+    result = fmpy.simulate_fmu(
+        str(exported(Follower(), "follower", fmi)),
+        stop_time=1.0,
+        output_interval=0.25,
+        fmi_type=kind,
+        input=table,
+        output=["y", "x"],
+        relative_tolerance=1e-10,
+    )
+    assert result["y"][result["time"] == 0.5].tolist() == shown
+    assert result["y"][result["time"] == 0.75] == 1.0
+    np.testing.assert_allclose(result["x"], np.maximum(result["time"] - 0.5, 0.0), atol=1e-9)

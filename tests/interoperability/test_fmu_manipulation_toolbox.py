@@ -112,20 +112,24 @@ def test_models_in_a_container_are_the_python_run(name, fmi, exported, tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("versions", "fmi", "sequential", "late"),
+    ("versions", "fmi", "sequential", "along", "late"),
     [
-        (("2.0", "2.0"), "2.0", False, True),
-        (("3.0", "3.0"), "3.0", False, True),
-        (("3.0", "2.0"), "2.0", False, True),
-        (("2.0", "2.0"), "2.0", True, False),
+        (("2.0", "2.0"), "2.0", False, True, True),
+        (("3.0", "3.0"), "3.0", False, True, True),
+        (("3.0", "2.0"), "2.0", False, True, True),
+        (("2.0", "2.0"), "2.0", True, True, False),
+        (("2.0", "2.0"), "2.0", True, False, True),
         # The switch at the end of a step is an event of its own, behind the step: the receiver got what was sent in it.
-        (("3.0", "3.0"), "3.0", True, True),
+        (("3.0", "3.0"), "3.0", True, True, True),
     ],
 )
-def test_signals_between_our_fmus_in_a_container(versions, fmi, sequential, late, exported, tmp_path):
-    """In parallel mode outputs are handed over at the end of a step; the receiver follows in closed form."""
+def test_signals_between_our_fmus_in_a_container(versions, fmi, sequential, along, late, exported, tmp_path):
+    """In parallel mode outputs are handed over at the end of a step; the receiver follows in closed form.
+
+    In sequential mode at once, if the FMUs are listed along the links.
+    """
     sender, receiver = exported(Blinking(), "blinking", versions[0]), exported(Sampled(), "sampled", versions[1])
-    made = container(tmp_path, [sender, receiver], fmi)
+    made = container(tmp_path, [sender, receiver] if along else [receiver, sender], fmi)
     made.add_link(sender.name, "sent", receiver.name, "heard")
     made.add_output(sender.name, "sent", "sent")
     made.add_start_value(receiver.name, "gain", "2.0")
@@ -138,6 +142,29 @@ def test_signals_between_our_fmus_in_a_container(versions, fmi, sequential, late
         heard = sent[k - 1] if late else sent[k]
         x.append(heard + (x[-1] - heard) * np.exp(-0.02))
     np.testing.assert_allclose(found["x"], x, rtol=0, atol=STATE_TOLERANCE)
+
+
+def interface(path):
+    """What a container shows, and the step that it proposes."""
+    description = fmpy.read_model_description(str(path))
+    return {variable.name for variable in description.modelVariables}, float(description.defaultExperiment.stepSize)
+
+
+@pytest.mark.parametrize(("fmi", "clocks"), [("2.0", set()), ("3.0", {"impact", "next_event"})])
+def test_clocks_are_shown_by_containers_of_fmi_3_only(fmi, clocks, exported, tmp_path):
+    made = container(tmp_path, [exported(BouncingBall(), "ball")], fmi)
+    made.add_implicit_rule()
+    made.make_fmu(tmp_path / "container.fmu", step_size=0.01)
+    assert interface(tmp_path / "container.fmu")[0] == {"time", "h", "v"} | clocks
+
+
+@pytest.mark.parametrize("fmi", VERSIONS)
+def test_a_container_takes_the_step_that_our_fmu_proposes(fmi, tmp_path):
+    export_fmu(BouncingBall(), tmp_path / "ball.fmu", fmi=fmi, stop_time=2.0)
+    made = container(tmp_path, [tmp_path / "ball.fmu"], fmi)
+    made.add_implicit_rule()
+    made.make_fmu(tmp_path / "container.fmu")
+    assert interface(tmp_path / "container.fmu")[1] == 0.005
 
 
 def test_parameters_that_are_arrays_cannot_be_shown_by_its_containers(exported, tmp_path):

@@ -13,6 +13,7 @@ execution = pytest.importorskip("libcosimpy.CosimExecution", reason=reason)
 observers = pytest.importorskip("libcosimpy.CosimObserver", reason=reason)
 slaves = pytest.importorskip("libcosimpy.CosimSlave", reason=reason)
 logs = pytest.importorskip("libcosimpy.CosimLogging", reason=reason)
+enums = pytest.importorskip("libcosimpy.CosimEnums", reason=reason)
 
 REAL, INTEGER = 0, 1
 STEP = 0.01
@@ -132,3 +133,22 @@ def test_an_fmu_that_ends_its_run_stops_libcosim(exported):
             break
     # The impacts accumulate at 2.5587 s: in the sixth step.
     assert results == [True] * 5 + [False]
+
+
+def test_it_makes_a_step_whenever_it_is_asked_to_run_until_a_time(exported):
+    """So ask for times that rise; and its time series lacks the last sample."""
+    simulation = Simulation({"ball": exported(BouncingBall(), "ball", "2.0")}, 0.1)
+    reference, _ = simulation.variables["ball"]["h"]
+    series = observers.CosimObserver.create_time_series()
+    simulation.execution.add_observer(series)
+    series.start_time_series(simulation.slaves["ball"], reference, enums.CosimVariableType.REAL)
+    reached = []
+    for target in (200_000_000, 200_000_000, 100_000_000):
+        assert simulation.execution.simulate_until(target)
+        reached.append(simulation.execution.status().current_time)
+    assert reached == [200_000_000, 300_000_000, 400_000_000]
+    times, _, values = series.time_series_real_samples(simulation.slaves["ball"], reference, 0, 50)
+    assert times == [0, 100_000_000, 200_000_000, 300_000_000]
+    expected = [1.0 - 9.81 * (t * 1e-9) ** 2 / 2 for t in times]
+    assert values == pytest.approx(expected, abs=STATE_TOLERANCE)
+    assert simulation.get("ball", "h") == pytest.approx(1.0 - 9.81 * 0.4**2 / 2, abs=STATE_TOLERANCE)
