@@ -1,6 +1,6 @@
 """Ecos, a co-simulation engine on fmi4c, through the ecospy wheel: FMI 2.0 and 3.0, fixed steps, no event mode.
 
-The FMUs are exported without clocks: unloading ours of FMI 3.0 that have some ends the process.
+The FMUs are exported without clocks, as docs/interoperability.md tells users of Ecos to do.
 """
 
 import ctypes
