@@ -318,6 +318,60 @@ def test_in_the_phase_plane_each_flow_keeps_its_energy(ball, ax):
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("h (m)", "v (m/s)")
 
 
+class Oscillator(hm.HybridAutomaton):
+    """A circle in metres and metres, and the same numbers in other units and sizes."""
+
+    x = hm.State(1.0, unit="m")
+    y = hm.State(0.0, unit="m")
+    w = hm.State([1.0, 0.0])
+    rate = hm.Output(unit="m/s")
+    near = hm.Output()
+    far = hm.Output()
+
+    def flow_map(self, s):
+        return {"x": s.y, "y": -s.x, "w": np.array([s.w[1], -s.w[0]])}
+
+    def outputs(self, s):
+        return {"rate": s.y, "near": 5.0 * s.x, "far": 100.0 * s.x}
+
+
+@pytest.mark.parametrize(
+    ("horizontal", "vertical", "equal"),
+    [
+        ("x", "y", True),
+        ("w[1]", "w[2]", True),
+        ("x", "rate", False),
+        ("x", "near", False),
+        ("w[1]", "near", True),
+        ("near", "far", False),
+        ("w[1]", "far", False),
+    ],
+)
+def test_equal_units_have_equal_scales_in_the_phase_plane(horizontal, vertical, equal, ax):
+    arc = hm.simulate(Oscillator(), 6.5)
+    plots.plot_phase(arc, horizontal, vertical, ax=ax)
+    ax.figure.canvas.draw()
+    one = ax.transData.transform([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    # Pixels of a length of one along each axis.
+    along = np.linalg.norm(one[1:] - one[0], axis=1)
+    assert (along[0] == pytest.approx(along[1], rel=1e-9)) == equal
+    # All of the run is seen.
+    line = next(line for line in ax.lines if line.get_label().startswith("_child"))
+    for values, (low, high) in zip(line.get_data(), (ax.get_xlim(), ax.get_ylim()), strict=True):
+        assert low <= np.nanmin(values)
+        assert np.nanmax(values) <= high
+
+
+def test_equal_scales_in_axes_that_share_theirs():
+    figure, both = plt.subplots(1, 2, sharex=True, sharey=True)
+    for axes in both:
+        plots.plot_phase(hm.simulate(Oscillator(), 6.5), "x", "y", ax=axes)
+    figure.canvas.draw()
+    one = both[1].transData.transform([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    assert one[1, 0] - one[0, 0] == pytest.approx(one[2, 1] - one[0, 1], rel=1e-9)
+    plt.close(figure)
+
+
 def test_a_second_run_in_the_phase_plane_does_not_double_the_legend(ball, ax):
     plots.plot_phase(ball, "h", "v", ax=ax)
     plots.plot_phase(hm.simulate(BouncingBall(h=2.0), 1.0), "h", "v", ax=ax)
@@ -532,6 +586,23 @@ def test_an_error_meets_its_threshold_where_it_jumps(ax):
     # Located to a few ulp of t near 100 s, at less than 0.2 K/s.
     assert before[:, 1] == pytest.approx(1.0, abs=1e-12)
     assert set(drawn(ax, "threshold")[:, 1]) == {1.0}
+
+
+@pytest.mark.parametrize("e", [0.7, 0.6, 0.5])
+def test_impacts_are_marked_whatever_the_rounding_of_the_height(e):
+    """Before an impact the height is zero, or off by a rounding; the drawing does not depend on which."""
+    ball = hm.simulate(BouncingBall(e=e), 1.3)
+    heights = [jump.x_before[0] for jump in ball.jumps]
+    assert 0.0 < max(map(abs, heights)) < 1e-12
+    figure, (name, height, speed) = plt.subplots(3)
+    plots.plot_threshold(ball, "h", 0.5, ax=name)
+    assert list(drawn(name, "_before")[:, 0]) == [jump.t for jump in ball.jumps]
+    # As a function of values the height does not jump at all, the speed at every impact.
+    plots.plot_threshold(ball, lambda s: s.h, 0.5, ax=height)
+    assert len(drawn(height, "_before")) == 0
+    plots.plot_threshold(ball, lambda s: s.v, 0.5, ax=speed)
+    assert list(drawn(speed, "_before")[:, 0]) == [jump.t for jump in ball.jumps]
+    plt.close(figure)
 
 
 def test_an_error_and_its_threshold_may_be_variables_and_numbers(ball, ax):

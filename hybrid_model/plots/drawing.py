@@ -15,6 +15,8 @@ from hybrid_model.variables import FloatArray
 
 MARKED_JUMPS = 60
 """Jumps are marked by default up to this number; markers of more of them would hide the curve."""
+VISIBLE = 1e-6
+"""Changes below this part of the largest value are rounding, as of a located state, and no drawing shows them."""
 DASHES: dict[str, Any] = {"linestyle": (0, (2.5, 1.5)), "marker": "", "label": "_jumps"}
 BEFORE: dict[str, Any] = {"linestyle": "none", "marker": "o", "label": "_before"}
 AFTER: dict[str, Any] = {"linestyle": "none", "marker": "o", "label": "_after"}
@@ -86,7 +88,7 @@ def marked_jumps(
         Its values on the trace's grid.
     jumps : sequence of str, optional
         Names of the jumps to mark. Default: those of the part of a composition that the variable belongs to, without
-        internal ones, and those that change the variable; none if these are more than `MARKED_JUMPS`.
+        internal ones, and those that change the values visibly; none if these are more than `MARKED_JUMPS`.
 
     Raises
     ------
@@ -95,9 +97,17 @@ def marked_jumps(
     """
     if jumps is not None:
         return jump_mask(trace.arc, [jumps] if isinstance(jumps, str) else jumps)
-    marked = values[trace.last[:-1]] != values[trace.first[1:]]
+    marked = _visibly_changed(values[trace.last[:-1]], values[trace.first[1:]], values)
     if scalar is not None:
         scope = scalar.variable.name.rpartition(".")[0]
         events = [info.name for info in trace.arc.automaton.jumps if not info.internal]
         marked |= jump_mask(trace.arc, [name for name in events if not scope or name.startswith(f"{scope}.")])
     return marked if marked.sum() <= MARKED_JUMPS else np.zeros_like(marked)
+
+
+def _visibly_changed(before: FloatArray, after: FloatArray, values: FloatArray) -> npt.NDArray[np.bool_]:
+    size = np.max(np.abs(values[np.isfinite(values)]), initial=0.0)
+    with np.errstate(invalid="ignore"):
+        same: npt.NDArray[np.bool_] = np.abs(after - before) <= VISIBLE * size
+    same |= (before == after) | (np.isnan(before) & np.isnan(after))
+    return ~same

@@ -11,8 +11,12 @@ from matplotlib.ticker import MaxNLocator
 
 from hybrid_model.arc import HybridArc
 from hybrid_model.plots.drawing import draw_arc, marked_jumps
-from hybrid_model.plots.style import JUMPS, TIME, add_label, legend, new_axes, short_names, with_unit
+from hybrid_model.plots.style import JUMPS, TIME, add_label, equal_scales, legend, new_axes, short_names, with_unit
 from hybrid_model.plots.trace import Scalar, Trace, find_scalar, find_scalars, jump_mask
+from hybrid_model.variables import FloatArray
+
+COMPARABLE = 10.0
+"""Ranges of two numbers without unit that differ by more than this factor are given scales of their own."""
 
 
 def plot_over_time(
@@ -71,6 +75,9 @@ def plot_phase(
 ) -> Axes:
     """Draw one variable over another, with a triangle at the start and a square at the end.
 
+    Variables of one unit have one scale, so that a circle is round; numbers without a unit have it if their ranges are
+    comparable.
+
     Parameters
     ----------
     arc : HybridArc
@@ -102,8 +109,19 @@ def plot_phase(
         ax.plot(*(v[[at]] for v in points), marker=marker, label=f"_{text}" if text in present else text, **ends)
     ax.set_xlabel(add_label(ax.get_xlabel(), x.label))
     ax.set_ylabel(add_label(ax.get_ylabel(), y.label))
+    if _comparable(x, y, points):
+        equal_scales(ax)
     legend(ax)
     return ax
+
+
+def _comparable(x: Scalar, y: Scalar, points: Sequence[FloatArray]) -> bool:
+    """Whether two scalars are of one kind, by their unit, or without one by their ranges."""
+    if x.variable.unit or y.variable.unit or x.variable is y.variable:
+        return x.variable.unit == y.variable.unit
+    finite = [values[np.isfinite(values)] for values in points]
+    short, long = sorted(float(np.ptp(values)) if values.size else 0.0 for values in finite)
+    return long <= COMPARABLE * short
 
 
 def plot_hybrid_arc(

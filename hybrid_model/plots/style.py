@@ -69,6 +69,13 @@ def new_axes(ax: Axes | None, *, solid: bool = False) -> Axes:
     return ax
 
 
+def equal_scales(ax: Axes) -> None:
+    """Give both axes one scale; limits give way, or the box where other axes share them."""
+    groups = ax.get_shared_x_axes(), ax.get_shared_y_axes()
+    shared = any(len(group.get_siblings(ax)) > 1 for group in groups)
+    ax.set_aspect("equal", adjustable="box" if shared else "datalim")
+
+
 def unit_text(unit: str) -> str:
     """Return a unit in FMI notation as a reader expects it: ``m/s2`` with a raised 2, ``degC`` with a degree sign."""
     text = unit.replace("deg", "°") if re.fullmatch(r"deg[CF]?", unit) else unit

@@ -82,7 +82,8 @@ def plot_threshold(
     ax : Axes, optional
         Where to draw.
     jumps : sequence of str, optional
-        Names of the jumps to mark. Default: those that change the error, up to 60.
+        Names of the jumps to mark. Default: of a variable as in `plot_over_time`, of a function those that change its
+        values visibly; none if these are more than 60.
     **line_options
         Of the error's line, as in ``Axes.plot``.
 
@@ -94,7 +95,7 @@ def plot_threshold(
     trace = Trace(arc)
     label, values = _quantity(trace, error, "error")
     level_label, level = _quantity(trace, threshold, "threshold")
-    marked = marked_jumps(trace, None, values, jumps)
+    marked = marked_jumps(trace, find_scalar(arc, error) if isinstance(error, str) else None, values, jumps)
     ax = new_axes(ax)
     draw_arc(ax, trace, [trace.t, values], marked, {"label": label} | line_options)
     ax.plot(trace.t, level, color="k", linestyle=(0, (6, 2)), linewidth=1.0, label=level_label)
