@@ -83,6 +83,8 @@ def simulate_network(
         Times in s.
     inputs : mapping, optional
         Input of the composition -> number, array, function of time, or `Signal`.
+        A function that jumps or has short pulses needs a `Signal` with its breakpoints: a plain one is looked at where
+        the solver steps, and a pulse between two steps goes unseen.
     solver : Solver, optional
         Method and accuracy.
     zeno : ZenoGuard, optional

@@ -19,7 +19,11 @@ from hybrid_model.variables import FloatArray, Kind, Variable, start_array, unkn
 
 @dataclass(frozen=True)
 class Signal:
-    """A function of time that jumps at known times.
+    """A function of time that jumps at known times, or does something short there.
+
+    A run sees a plain function of time only at the points that its solver chooses, and steps over a pulse between two
+    of them in silence; it never steps over a breakpoint. A pulse is ``Signal(lambda t: 1.0 if 50 <= t < 50.1 else 0.0,
+    [50, 50.1])``.
 
     Attributes
     ----------

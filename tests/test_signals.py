@@ -119,3 +119,13 @@ def test_a_run_follows_its_inputs():
     assert arc.end.x == pytest.approx(1.0 - math.cos(2.0) + 1.0, abs=1e-12)
     assert arc.at("u", 0.25) == math.sin(0.25)
     np.testing.assert_array_equal(arc.at("w", [0.5, 1.0]), [[0.0, 0.0], [1.0, 0.0]])
+
+
+def test_a_pulse_with_breakpoints_is_not_stepped_over():
+    """A pulse of 1 from 50 s to 50.1 s into an integrator adds 0.1; a plain function of time may not show it."""
+
+    def pulse(t):
+        return 1.0 if 50.0 <= t < 50.1 else 0.0
+
+    options = {"u": hm.Signal(pulse, [50.0, 50.1])}
+    assert hm.simulate(Plant(), 100.0, inputs=options).end.x == pytest.approx(0.1, abs=1e-12)

@@ -105,6 +105,35 @@ def test_every_declared_variable_is_readable_right_after_initialisation(name, ex
         fmu.freeInstance()
 
 
+class Sampler(hm.HybridAutomaton):
+    """Takes its input every 1/8 s."""
+
+    u = hm.Input(0.0)
+    y = hm.DiscreteState(0.0, output=True)
+    k = hm.DiscreteState(0, integer=True)
+    transitions = (hm.TimeEvent("sample", lambda self, s: 0.125 * s.k, lambda self, s: {"y": s.u, "k": s.k + 1}),)
+
+
+@pytest.mark.parametrize(
+    ("fmi", "kind", "use", "sampled"),
+    [
+        ("2.0", "CoSimulation", {}, 0.0),
+        ("2.0", "ModelExchange", {}, 1.0),
+        ("3.0", "CoSimulation", {}, 0.0),
+        ("3.0", "CoSimulation", {"use_event_mode": True, "early_return_allowed": True}, 1.0),
+        ("3.0", "ModelExchange", {}, 1.0),
+    ],
+)
+def test_an_input_that_steps_when_it_is_sampled(fmi, kind, use, sampled, exported):
+    """The input steps at the fourth sample, 3/8 s; only without event mode the sample is taken before it can be set."""
+    step = np.array([(0.0, 0.0), (0.375, 0.0), (0.375, 1.0), (1.0, 1.0)], dtype=[("time", float), ("u", float)])
+    path = str(exported(Sampler(), fmi=fmi))
+    result = fmpy.simulate_fmu(path, stop_time=0.45, input=step, fmi_type=kind, output_interval=0.025, **use)
+    assert result["y"][-1] == sampled
+    arc = hm.simulate(Sampler(), 0.45, inputs={"u": hm.Signal(lambda t: 1.0 * (t >= 0.375), [0.375])})
+    assert arc.end.y == 1.0
+
+
 def test_start_values_and_parameters_can_be_set(exported):
     path = str(exported(BouncingBall(), "ball"))
     result = fmpy.simulate_fmu(path, stop_time=0.4, start_values={"h": 2.0, "g": 5.0}, output_interval=0.4)
