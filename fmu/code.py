@@ -106,7 +106,7 @@ def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
 
 def _variable(variable: FmuVariable, names: NameTable) -> str:
     kind = (variable.type.value, variable.bank.value)
-    flags = map(boolean, (variable.discrete, variable.calculated))
+    flags = map(boolean, (variable.discrete, variable.calculated, variable.tunable))
     return row(names.entry(variable.name), variable.index, variable.size, *kind, *flags)
 
 

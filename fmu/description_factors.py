@@ -1,4 +1,4 @@
-"""How strongly an expression depends on its arguments: by a constant factor, a fixed or discrete one, or freely.
+"""How strongly an expression depends on its arguments: by a constant, fixed, tunable or discrete factor, or freely.
 
 A factor is the partial derivative. It says what the dependency is only where the argument does not pass a function
 with steps (a comparison, ``sign``, ``floor``) on its way: derivatives do not see those.
@@ -24,8 +24,9 @@ class Factor(enum.IntEnum):
 
     CONSTANT = 0
     FIXED = 1
-    DISCRETE = 2
-    DEPENDENT = 3
+    TUNABLE = 2
+    DISCRETE = 3
+    DEPENDENT = 4
 
 
 _T, _X, _Z, _U, _P = range(5)
@@ -36,7 +37,7 @@ _STEPS = frozenset(
 """Operations whose derivative hides that they jump."""
 
 
-def factors(function: ca.Function, result: int = 0) -> list[Matrix]:
+def factors(function: ca.Function, result: int = 0, tunable: Sequence[int] = ()) -> list[Matrix]:
     """Classify the dependencies of a function's result on each of its arguments t, x, z, u, p.
 
     Parameters
@@ -45,6 +46,8 @@ def factors(function: ca.Function, result: int = 0) -> list[Matrix]:
         Function of scalar expressions, with arguments t, x, z, u, p.
     result : int
         Number of the result.
+    tunable : sequence of int
+        Places in p of the parameters that may change at events.
 
     Returns
     -------
@@ -59,7 +62,7 @@ def factors(function: ca.Function, result: int = 0) -> list[Matrix]:
     for number, argument in enumerate(arguments):
         pattern = function.jac_sparsity(result, number)
         rows, columns = (np.array(index, dtype=np.int64) for index in pattern.get_triplet())
-        kinds = _kinds(arguments, expression, number, rows, columns)
+        kinds = _kinds(arguments, expression, number, rows, columns, tunable)
         if stepped:
             through = [
                 bool(stepped[row] >> int(ends[number] + column) & 1) for row, column in zip(rows, columns, strict=True)
@@ -76,6 +79,7 @@ def _kinds(
     number: int,
     rows: npt.NDArray[np.int64],
     columns: npt.NDArray[np.int64],
+    tunable: Sequence[int],
 ) -> npt.NDArray[np.int64]:
     """Return the kind of each dependency by what its partial derivative depends on."""
     kinds = np.full(rows.size, Factor.DEPENDENT, dtype=np.int64)
@@ -88,7 +92,12 @@ def _kinds(
     depends = [_rows_that_depend(entries, item) for item in arguments]
     # A factor that moves with what it is a factor of is none: z in z * z.
     free = depends[_T] | depends[_X] | depends[_U] | depends[number]
-    by_entry = np.select([free, depends[_Z], depends[_P]], [Factor.DEPENDENT, Factor.DISCRETE, Factor.FIXED], 0)
+    tuned = _rows_that_depend(entries, arguments[_P][list(tunable)])
+    by_entry = np.select(
+        [free, depends[_Z], tuned, depends[_P]],
+        [Factor.DEPENDENT, Factor.DISCRETE, Factor.TUNABLE, Factor.FIXED],
+        Factor.CONSTANT,
+    )
     width = argument.numel()
     order = np.argsort(known_rows * width + known_columns)
     keys = (known_rows * width + known_columns)[order]

@@ -41,7 +41,7 @@ class Unknown:
     dependencies : tuple of int
         Positions of the knowns that it depends on, ascending.
     kinds : tuple of str or None
-        How it depends on each: dependent, constant, fixed or discrete; None if the trace does not tell.
+        How it depends on each: dependent, constant, fixed, tunable or discrete; None if the trace does not tell.
     """
 
     variable: int
@@ -138,7 +138,11 @@ class _Maps:
     def _row(self, result: str) -> Matrix:
         if self.told:
             name, _, part = result.partition("_") if result.startswith("start_") else (result, "", "x")
-            sides = factors(getattr(self.traced, name), "xz".index(part))
+            parameters = self.traced.layout.places[Kind.PARAMETER]
+            tunable = [
+                k for place in parameters if place.variable.tunable for k in range(place.at.start, place.at.stop)
+            ]
+            sides = factors(getattr(self.traced, name), "xz".index(part), tunable)
         else:
             patterns = [sparse.csr_array(self.traced.pattern(result, argument)) for argument in _ARGUMENTS]
             if result == "flow_set":

@@ -121,6 +121,11 @@ class FmuVariable:
         return self.variability == "discrete"
 
     @property
+    def tunable(self) -> bool:
+        """Whether it is a parameter that may be set between events."""
+        return self.variability == "tunable"
+
+    @property
     def calculated(self) -> bool:
         """Whether its start value is computed and cannot be set."""
         return self.initial == "calculated"
@@ -236,7 +241,7 @@ def _elements(whole: FmuVariable, names: Sequence[str]) -> Iterator[FmuVariable]
 def _attributes(kind: Kind, place: Place) -> tuple[str, str, str | None]:
     variable = place.variable
     if kind is Kind.PARAMETER:
-        return "parameter", "fixed", "exact"
+        return "parameter", "tunable" if variable.tunable else "fixed", "exact"
     if kind is Kind.INPUT:
         return "input", "discrete" if variable.discrete else "continuous", None
     if kind is Kind.OUTPUT:

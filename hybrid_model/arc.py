@@ -45,7 +45,7 @@ class HybridArc:
 
     def __init__(self, execution: Execution, flows: Sequence[FlowRecord], jumps: list[JumpRecord]) -> None:
         assert execution.stopped is not None
-        read = ComputedValues(execution.automaton, execution.p, execution.inputs)
+        read = ComputedValues(execution.automaton, execution.inputs)
         self._fill(read, flows, jumps, execution.stopped, execution.message, execution.solver.event_tolerance)
 
     @classmethod
@@ -354,7 +354,9 @@ class HybridArc:
     def _table(
         self, names: Iterable[str] | None, points: Sequence[tuple[float, FloatArray, FloatArray]]
     ) -> dict[str, FloatArray]:
-        chosen = [v.name for v in self.automaton.variables if v.kind is not Kind.PARAMETER] if names is None else names
+        # Parameters are told once, but for those that may change.
+        told = [v.name for v in self.automaton.variables if v.tunable or v.kind is not Kind.PARAMETER]
+        chosen = told if names is None else names
         return {
             name: np.array([self._read.value(name, *point) for point in points], dtype=np.float64).reshape(
                 len(points), *self.variable(name).shape

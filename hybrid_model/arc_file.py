@@ -30,7 +30,8 @@ from hybrid_model.transitions import ClockInfo, JumpInfo, Priority, Trigger
 from hybrid_model.variables import FloatArray, Kind, Variable
 
 SCHEMA = "hybrid-fmu hybrid arc"
-VERSION = 1
+VERSION = 2
+"""Version 2 has the parameters as a table in time; files of version 1, in which they are one row, are read as well."""
 ROUNDING = 64.0 * float(np.finfo(np.float64).eps)
 """Error of the stored dense output that is aimed at, as a part of the largest value of each scalar in the run: a few
 dozen operations, as the dense output itself has."""
@@ -64,12 +65,14 @@ def save_arc(read: ArcValues, flows: Sequence[FlowRecord], arc: HybridArc, path:
         f"jump_{side}": _rows([getattr(jump, side) for jump in arc.jumps])
         for side in ("x_before", "z_before", "x_after", "z_after")
     }
+    times, parameters = read.parameter_steps(float(arc.t[0]), float(arc.t[-1]))
     content: dict[str, Any] = {
         "schema": np.array(SCHEMA),
         "version": np.array(VERSION),
         "about": np.frombuffer(json.dumps(_about(arc)).encode(), dtype=np.uint8),
         "start_values": np.concatenate([np.zeros(0), *(v.start.ravel() for v in arc.automaton.variables)]),
-        "parameters": read.parameters,
+        "parameter_times": times,
+        "parameters": parameters,
         "event_tolerance": np.array(arc.event_tolerance),
         "t": arc.t,
         "j": arc.j,
@@ -126,7 +129,7 @@ def _content(path: Path) -> Table:
         with np.load(path, allow_pickle=False) as file:
             schema = str(file["schema"]) if "schema" in file else None
             version = int(file["version"]) if "version" in file else None
-            if schema == SCHEMA and version == VERSION:
+            if schema == SCHEMA and version in (1, VERSION):
                 return {name: file[name] for name in file.files}
     except FileNotFoundError:
         raise
@@ -137,7 +140,7 @@ def _content(path: Path) -> Table:
     if schema != SCHEMA:
         raise DataError(f"{path} holds no hybrid arc: give a file that HybridArc.save has written.")
     raise DataError(
-        f"{path} has version {version} of the schema, and this package reads version {VERSION}: "
+        f"{path} has version {version} of the schema, and this package reads versions 1 to {VERSION}: "
         "install the version of hybrid-fmu that wrote the file, or a later one."
     )
 
@@ -207,7 +210,9 @@ def _automaton(about: Table, starts: FloatArray) -> RecordedAutomaton:
 def _arc(content: Table) -> HybridArc:
     about = json.loads(content["about"].tobytes().decode())
     automaton = _automaton(about, content["start_values"])
-    read = RecordedValues(automaton, content["parameters"], content["interpolation_error"])
+    times = content.get("parameter_times", content["t"][:1])
+    parameters = np.atleast_2d(content["parameters"])
+    read = RecordedValues(automaton, times, parameters, content["interpolation_error"])
     _require_lengths(content, sum(read.layout.sizes[kind] for kind in (Kind.STATE, Kind.INPUT, Kind.OUTPUT)))
     flows = _flows(content)
     first = int(content["j"][0])
@@ -240,6 +245,8 @@ def _require_lengths(content: Table, width: int) -> None:
         "part_points": (parts,),
         "points": (int(np.sum(content["part_points"])), width),
     }
+    if "parameter_times" in content:
+        shapes["parameter_times"] = (len(content["parameters"]),)
     for name, shape in shapes.items():
         if content[name].shape != shape:
             raise ValueError(f"{name} has shape {content[name].shape} in place of {shape}")

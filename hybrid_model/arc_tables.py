@@ -23,13 +23,13 @@ def dataframe(arc: HybridArc, names: Iterable[str] | None = None) -> Any:
     arc : HybridArc
         The run.
     names : iterable of str, optional
-        Which variables; default: all but the parameters.
+        Which variables; default: all but the parameters that are fixed for a run.
 
     Returns
     -------
     pandas.DataFrame
         One row a sample, index (t in s, j); one column a scalar, the elements of arrays as ``w[1]``, ``w[2]``. Its
-        ``attrs`` hold ``units`` and ``descriptions`` by column, ``parameters`` by name, and how the run ended.
+        ``attrs`` hold ``units`` and ``descriptions`` by column, the fixed ``parameters``, and how the run ended.
 
     Raises
     ------
@@ -58,14 +58,14 @@ def dataset(arc: HybridArc, names: Iterable[str] | None = None) -> Any:
     arc : HybridArc
         The run.
     names : iterable of str, optional
-        Which variables; default: all but the parameters.
+        Which variables; default: all but the parameters that are fixed for a run.
 
     Returns
     -------
     xarray.Dataset
         Dimension ``sample`` with the index (t, j), then one dimension a length, ``w_1`` for the first of ``w``. Each
         variable has ``units``, ``description`` and ``kind`` in its ``attrs``; the Dataset has how the run ended, and
-        the parameters. ``reset_index("sample")`` makes plain coordinates, as netCDF files need them.
+        the fixed parameters. ``reset_index("sample")`` makes plain coordinates, as netCDF files need them.
 
     Raises
     ------
@@ -100,7 +100,8 @@ def _about(arc: HybridArc) -> dict[str, Any]:
 
 
 def _parameters(arc: HybridArc) -> dict[str, FloatArray]:
-    return {v.name: np.asarray(arc.at(v.name, arc.t[0])) for v in arc.automaton.of_kind(Kind.PARAMETER)}
+    fixed = [v.name for v in arc.automaton.of_kind(Kind.PARAMETER) if not v.tunable]
+    return {name: np.asarray(arc.at(name, arc.t[0])) for name in fixed}
 
 
 def _installed(package: str, what: str) -> Any:

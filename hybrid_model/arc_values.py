@@ -27,19 +27,24 @@ class ArcValues(ABC):
     ----------
     automaton : Automaton
         Whose variables.
-    parameters : ndarray
-        The parameter vector of the run.
     """
 
-    def __init__(self, automaton: Automaton, parameters: FloatArray) -> None:
+    def __init__(self, automaton: Automaton) -> None:
         self.automaton = automaton
-        self.parameters = parameters
         self.layout = Layout(automaton)
         self._places = {place.variable.name: place for places in self.layout.places.values() for place in places}
 
     @abstractmethod
     def states(self, x: FloatArray) -> FloatArray:
         """Return the continuous states in the vector that a flow carries."""
+
+    @abstractmethod
+    def parameters(self, t: float) -> FloatArray:
+        """Return the parameter vector at time `t` in s, continuous from the right."""
+
+    @abstractmethod
+    def parameter_steps(self, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+        """Return the times in [t0, t1] from which on the parameters are constant, t0 first, and their rows."""
 
     @abstractmethod
     def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
@@ -68,7 +73,7 @@ class ArcValues(ABC):
 
     def values(self, t: float, x: FloatArray, z: FloatArray) -> Values:
         """Return all values but the outputs, by name."""
-        return self.layout.values(t, self.states(x), z, self.inputs(t, x, z), self.parameters)
+        return self.layout.values(t, self.states(x), z, self.inputs(t, x, z), self.parameters(t))
 
     def value(self, name: str, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """Return one variable's value, of the variable's shape."""
@@ -78,7 +83,7 @@ class ArcValues(ABC):
         elif kind is Kind.DISCRETE:
             vector = z
         elif kind is Kind.PARAMETER:
-            vector = self.parameters
+            vector = self.parameters(t)
         else:
             vector = self.inputs(t, x, z) if kind is Kind.INPUT else self.outputs(t, x, z)
         return np.asarray(self._places[name].take(vector), dtype=np.float64)
@@ -89,25 +94,31 @@ class ArcValues(ABC):
 
 
 class ComputedValues(ArcValues):
-    """Reads a run: inputs from their signals, outputs from the automaton.
+    """Reads a run: inputs and parameters from their signals, outputs from the automaton.
 
     Parameters
     ----------
     automaton : Automaton
         What ran.
-    parameters : ndarray
-        Its parameter vector.
     signals : Inputs
-        Its inputs as functions of time.
+        Its inputs and parameters as functions of time.
     """
 
-    def __init__(self, automaton: Automaton, parameters: FloatArray, signals: Inputs) -> None:
-        super().__init__(automaton, parameters)
+    def __init__(self, automaton: Automaton, signals: Inputs) -> None:
+        super().__init__(automaton)
         self._signals = signals
 
     def states(self, x: FloatArray) -> FloatArray:
         """See `ArcValues.states`."""
         return x
+
+    def parameters(self, t: float) -> FloatArray:
+        """See `ArcValues.parameters`."""
+        return self._signals.parameters_at(t)
+
+    def parameter_steps(self, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+        """See `ArcValues.parameter_steps`."""
+        return self._signals.parameter_steps(t0, t1)
 
     def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """See `ArcValues.inputs`; continuous from the right."""
@@ -128,7 +139,7 @@ class ReceivedValues(ComputedValues):
 
     Parameters
     ----------
-    automaton, parameters, signals
+    automaton, signals
         As in `ComputedValues`; `signals` tells what the inputs from outside the network are.
     received : sequence of (float, int, ndarray)
         Hybrid time from which on, and the constants in the input vector; in order, the first at the start.
@@ -137,11 +148,10 @@ class ReceivedValues(ComputedValues):
     def __init__(
         self,
         automaton: Automaton,
-        parameters: FloatArray,
         signals: Inputs,
         received: Sequence[tuple[float, int, FloatArray]],
     ) -> None:
-        super().__init__(automaton, parameters, signals)
+        super().__init__(automaton, signals)
         self._times = [(t, j) for t, j, _ in received]
         self._held = [held for _, _, held in received]
 
@@ -158,15 +168,31 @@ class RecordedValues(ArcValues):
     ----------
     automaton : Automaton
         Whose variables.
-    parameters : ndarray
-        The parameter vector of the run.
+    parameter_times : ndarray, shape (n,)
+        Times in s from which on the parameters are constant, ascending.
+    parameters : ndarray, shape (n, size)
+        The parameter vector from each of those times on.
     errors : ndarray
         Interpolation error of each channel.
     """
 
-    def __init__(self, automaton: Automaton, parameters: FloatArray, errors: FloatArray) -> None:
-        super().__init__(automaton, parameters)
+    def __init__(
+        self, automaton: Automaton, parameter_times: FloatArray, parameters: FloatArray, errors: FloatArray
+    ) -> None:
+        super().__init__(automaton)
+        self._parameter_times, self._parameters = parameter_times, parameters
         self.errors = errors
+
+    def parameters(self, t: float) -> FloatArray:
+        """See `ArcValues.parameters`."""
+        row: FloatArray = self._parameters[max(int(np.searchsorted(self._parameter_times, t, side="right")) - 1, 0)]
+        return row
+
+    def parameter_steps(self, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+        """See `ArcValues.parameter_steps`."""
+        later = self._parameter_times[(self._parameter_times > t0) & (self._parameter_times <= t1)]
+        times = np.concatenate([[t0], later])
+        return times, np.array([self.parameters(float(t)) for t in times])
 
     def states(self, x: FloatArray) -> FloatArray:
         """See `ArcValues.states`."""

@@ -70,8 +70,11 @@ class AutomatonBlock(Block):
             changed = run.inputs.hold_element(index, value)
             if changed:
                 self.recording.receive(run.t, run.j, run.inputs.held)
+        elif kind is Kind.PARAMETER:
+            changed = run.inputs.hold_parameter(index, value)
+            run.tune()
         else:
-            vector = {Kind.STATE: run.x, Kind.DISCRETE: run.z, Kind.PARAMETER: run.p}[kind]
+            vector = {Kind.STATE: run.x, Kind.DISCRETE: run.z}[kind]
             changed = bool(vector[index] != value)
             vector[index] = value
         if changed:
@@ -142,15 +145,17 @@ class AutomatonBlock(Block):
         """See `Block.release`."""
 
     def _search(self, t_next: float) -> None:
-        """Flow to `t_next`, looking for events on the way."""
+        """Flow to `t_next`, looking for events on the way, and before it: what was set may have made a jump due."""
         run = self.run
-        while run.t < t_next and run.stopped is None:
-            self.recording.flowed(run.flow(t_next))
+        while run.stopped is None:
             self._take_internal()
             if self._events and run.due() is not None:
                 return
             if not self._events:
                 self._take_all()
+            if run.stopped is not None or run.t >= t_next:
+                return
+            self.recording.flowed(run.flow(t_next))
 
     def _take_internal(self) -> None:
         for jump in take_internal(self.run):

@@ -82,7 +82,7 @@ def simulate_network(
     t_end, t_start : float
         Times in s.
     inputs : mapping, optional
-        Input of the composition -> number, array, function of time, or `Signal`.
+        Input or tunable parameter of the composition -> as in `simulate`.
         A function that jumps or has short pulses needs a `Signal` with its breakpoints: a plain one is looked at where
         the solver steps, and a pulse between two steps goes unseen.
     solver : Solver, optional
@@ -158,7 +158,7 @@ def _blocks(
     s = whole.values()
     blocks = {}
     for part, automaton in network.parts.items():
-        own = {v.name: network.scoped_name(part, v.name) for v in automaton.of_kind(Kind.INPUT)}
+        own = {v.name: network.scoped_name(part, v.name) for v in automaton.of_kind(Kind.INPUT, Kind.PARAMETER)}
         given = {name: inputs[scoped] for name, scoped in own.items() if scoped in inputs}
         run = Execution(automaton, t_start=t_start, inputs=Inputs(Layout(automaton), given), solver=solver, zeno=zeno)
         _start(run, network.part_values(part, s), given)
@@ -187,7 +187,7 @@ def _result(
     arcs = {}
     for part, block in blocks.items():
         run, recording = block.run, block.recording
-        read = ReceivedValues(run.automaton, run.p, run.inputs, recording.received)
+        read = ReceivedValues(run.automaton, run.inputs, recording.received)
         flows = [replace(flow, z=np.append(flow.z, j)) for j, flow in enumerate(recording.flows)]
         arcs[part] = HybridArc.recorded(
             read,

@@ -80,7 +80,7 @@ class Execution:
     t, j : float, int
         Hybrid time.
     x, z, p : ndarray
-        Continuous states, discrete states, parameters.
+        Continuous states, discrete states, and parameters as they are at t.
     guards : int
         Number of jumps on state.
     levels : ndarray
@@ -113,7 +113,7 @@ class Execution:
         self.j = 0
         self.x = self.layout.start(Kind.STATE)
         self.z = self.layout.start(Kind.DISCRETE)
-        self.p = self.layout.start(Kind.PARAMETER)
+        self.tune()
         self.stopped: Stop | None = None
         self.message = ""
         self.next_step: float | None = None
@@ -143,8 +143,12 @@ class Execution:
         other = copy.copy(self)
         other.inputs = self.inputs.copy()
         other.monitor = copy.deepcopy(self.monitor)
-        other.x, other.z, other.p = self.x.copy(), self.z.copy(), self.p.copy()
+        other.x, other.z = self.x.copy(), self.z.copy()
         return other
+
+    def tune(self) -> None:
+        """Take the parameters as they are from the present time on."""
+        self.p = self.inputs.parameters_at(self.t)
 
     # Jumps.
 
@@ -304,6 +308,7 @@ class Execution:
             return []
         self.levels = self._zero_levels()
         pieces, left = integrate(self, limit, self.next_time_event())
+        self.tune()
         self._left_flow_set = left
         tolerance = self.solver.event_tolerance
         # Under flow priority a state that is outside by rounding flows on while it stays so (rule 3).
@@ -314,6 +319,7 @@ class Execution:
     def move(self, t: float, x: FloatArray, z: FloatArray, j: int) -> None:
         """Move to a point of a flow that a copy of this execution has already flown."""
         self.t, self.x, self.z, self.j = t, x, z, j
+        self.tune()
         self.levels = self._zero_levels()
 
     def _zero_levels(self) -> FloatArray:
@@ -333,6 +339,7 @@ class Execution:
             return []
         piece = straight_piece(self.t, t, self.x, self.x + (t - self.t) * self.rates_at(self.t, self.x))
         self.t, self.x = piece.t1, piece.x1
+        self.tune()
         return [piece]
 
     def _block(self, what: str) -> None:

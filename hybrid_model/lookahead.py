@@ -46,7 +46,11 @@ class Lookahead:
 
     @classmethod
     def from_run(cls, run: Execution, t_stop: float) -> Lookahead:
-        """Look ahead from `run`, at most to `t_stop` in s and over a bounded number of solver steps."""
+        """Look ahead from `run`, at most to `t_stop` in s and over a bounded number of solver steps.
+
+        What is set from outside at a known time can change outputs there, so the next such time ends the look-ahead.
+        """
+        t_stop = min(t_stop, run.inputs.next_breakpoint(run.t))
         ahead = cls(run.copy())
         end = ahead.end
         while end.stopped is None and end.t < t_stop and end.due() is None and len(ahead._way) < PIECES:

@@ -14,6 +14,7 @@ from hybrid_model.errors import DeclarationError, SimulationError
 from hybrid_model.layout import Layout, Place
 from hybrid_model.real_numbers import real_array, told
 from hybrid_model.signatures import require_map
+from hybrid_model.tuning import Steps, tuned_value
 from hybrid_model.variables import FloatArray, Kind, Variable, start_array, unknown_name
 
 
@@ -44,31 +45,38 @@ InputValue = npt.ArrayLike | Callable[[float], npt.ArrayLike] | Signal
 
 
 class Inputs:
-    """The input vector u of an automaton as a function of time.
+    """What comes from outside as functions of time: the input vector u of an automaton, and its parameter vector p.
 
     Parameters
     ----------
     layout : Layout
         Of the automaton.
     given : mapping, optional
-        Input name -> number, array, function of time or `Signal`; inputs not named keep their start values.
+        Input name -> number, array, function of time or `Signal`; inputs not named keep their start values. A tunable
+        parameter is given like a discrete input: it takes the value of its `Signal` at the start and at each
+        breakpoint, and holds it in between.
 
     Raises
     ------
     DeclarationError
-        For an unknown input or a value of the wrong shape.
+        For an unknown input, a parameter that is not tunable, or a value of the wrong shape.
     """
 
     def __init__(self, layout: Layout, given: Mapping[str, InputValue] | None = None) -> None:
         self._layout = layout
         self._held = layout.start(Kind.INPUT)
         self._signals: list[tuple[Place, Callable[[float], npt.ArrayLike]]] = []
+        self._parameters = layout.start(Kind.PARAMETER)
+        self._tuned: list[tuple[Place, Steps]] = []
         breakpoints: list[float] = []
         places = {place.variable.name: place for place in layout.places[Kind.INPUT]}
+        parameters = {place.variable.name: place for place in layout.places[Kind.PARAMETER]}
         for name, value in (given or {}).items():
-            if name not in places:
+            if name in parameters:
+                breakpoints += self._tune(parameters[name], value)
+            elif name not in places:
                 raise DeclarationError(unknown_input(layout.automaton.name, name, places))
-            if isinstance(value, Signal):
+            elif isinstance(value, Signal):
                 self._signals.append((places[name], value.value))
                 breakpoints += _finite_breakpoints(name, value)
             elif callable(value):
@@ -82,6 +90,40 @@ class Inputs:
             else:
                 self.hold(name, value)
         self._breakpoints = sorted(breakpoints)
+
+    def _tune(self, place: Place, value: InputValue) -> list[float]:
+        """Take what is given for a parameter, and return its breakpoints."""
+        owner, name = self._layout.automaton.name, place.variable.name
+        require_tunable(owner, place.variable, value)
+        if isinstance(value, Signal):
+            times = _finite_breakpoints(name, value)
+            self._tuned.append((place, Steps(place.variable, value.value, times)))
+            return times
+        assert not callable(value)
+        self._parameters[place.at] = tuned_value(place.variable, value)
+        return []
+
+    def parameters_at(self, t: float) -> FloatArray:
+        """Return p at time `t`, continuous from the right; the array must not be written to."""
+        if not self._tuned:
+            return self._parameters
+        p = self._parameters.copy()
+        for place, steps in self._tuned:
+            p[place.at] = steps.at(t)
+        return p
+
+    def parameter_steps(self, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+        """Return the times in [t0, t1] from which on p is constant, t0 first, and p from there, one row a time."""
+        times = sorted({t0, *(b for _, steps in self._tuned for b in steps.times if t0 < b <= t1)})
+        return np.array(times), np.array([self.parameters_at(t) for t in times])
+
+    def hold_parameter(self, index: int, value: float) -> bool:
+        """Set one scalar of p to a constant; return whether that changed it."""
+        changed = bool(self._parameters[index] != value)
+        if changed:
+            self._parameters = self._parameters.copy()
+            self._parameters[index] = value
+        return changed
 
     def hold(self, name: str, value: npt.ArrayLike) -> bool:
         """Set an input to a constant; return whether that changed it."""
@@ -142,6 +184,26 @@ class Inputs:
         other = copy.copy(self)
         other._held = self._held.copy()
         return other
+
+
+def require_tunable(owner: str, variable: Variable, value: InputValue) -> None:
+    """Refuse to change a parameter that is fixed for a run, or in another way than at events.
+
+    Raises
+    ------
+    DeclarationError
+        With what to give instead.
+    """
+    if not variable.tunable:
+        raise DeclarationError(
+            f"{owner}: parameter {variable.name} is fixed for a run: give its value when the instance is made, or "
+            "declare it with tunable=True."
+        )
+    if callable(value) and not isinstance(value, Signal):
+        raise DeclarationError(
+            f"{owner}: parameter {variable.name} changes at events only, so it cannot be a plain function of time: "
+            "give a number, or a Signal with the times at which it changes."
+        )
 
 
 def unknown_input(owner: str, name: str, known: Mapping[str, object]) -> str:

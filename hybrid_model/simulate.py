@@ -43,6 +43,8 @@ def simulate(
         Input name -> number, array, function of time, or `Signal`.
         A function that jumps or has short pulses needs a `Signal` with its breakpoints: a plain one is looked at where
         the solver steps, and a pulse between two steps goes unseen.
+        Tunable parameter -> number, array, or `Signal`: it
+        takes the signal's value at the start and at each breakpoint, before the jumps of that instant, and holds it.
     solver : Solver, optional
         Method and accuracy.
     zeno : ZenoGuard, optional

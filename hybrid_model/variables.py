@@ -54,6 +54,8 @@ class Variable:
         A discrete state nobody outside the block needs to see, such as an index into a schedule.
     computed : bool
         The start value comes from ``start_map``.
+    tunable : bool
+        A parameter that may be given another value during a run, at an event.
     dimensions : tuple of str
         Names of the lengths that give the shape, where they have names.
     minimum, maximum : float or None
@@ -72,6 +74,7 @@ class Variable:
     output: bool = False
     internal: bool = False
     computed: bool = False
+    tunable: bool = False
     dimensions: tuple[str, ...] = ()
     minimum: float | None = None
     maximum: float | None = None
@@ -351,7 +354,7 @@ class DiscreteState(Declaration):
 
 
 class Parameter(Declaration):
-    """A number fixed for a run.
+    """A number fixed for a run, or for the time between two events.
 
     Parameters
     ----------
@@ -359,14 +362,17 @@ class Parameter(Declaration):
         Its value unless an instance is given another.
     integer : bool
         Whether it holds whole numbers.
+    tunable : bool
+        Whether it may be given another value during a run: by ``inputs`` of `simulate`, by a master, or by the importer
+        of an FMU. A change is an event from outside: predictions are made anew, and what it makes due happens there.
     **options
         ``unit``, ``description``, ``shape``, ``minimum``, ``maximum``, ``nominal``: see `Declaration`.
     """
 
     kind = Kind.PARAMETER
 
-    def __init__(self, start: npt.ArrayLike, *, integer: bool = False, **options: Any) -> None:
-        super().__init__(start, integer=integer, **options)
+    def __init__(self, start: npt.ArrayLike, *, integer: bool = False, tunable: bool = False, **options: Any) -> None:
+        super().__init__(start, integer=integer, tunable=tunable, **options)
 
 
 class Input(Declaration):

@@ -14,7 +14,7 @@ from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DataError, DeclarationError
 from hybrid_model.real_numbers import real_array, told
 from hybrid_model.samples import Samples
-from hybrid_model.signals import InputValue, Signal, unknown_input
+from hybrid_model.signals import InputValue, Signal, require_tunable, unknown_input
 from hybrid_model.transitions import Assignments, Trigger
 from hybrid_model.variables import FloatArray, Kind, Values, Variable
 
@@ -60,7 +60,7 @@ class Subject:
     data : Samples or HybridArc
         With every state; an arc gives its inputs between samples too.
     inputs : mapping, optional
-        Input name -> number, array, function of time or `Signal`.
+        Input name -> number, array, function of time or `Signal`; tunable parameter -> number, array or `Signal`.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class Subject:
         self.z = self._columns(self._discrete)
         self.guards = [k for k, info in enumerate(automaton.jumps) if info.trigger is Trigger.STATE]
         self.timed = [k for k, info in enumerate(automaton.jumps) if info.trigger is Trigger.TIME]
-        self._fixed = {v.name: _value(v, v.start.ravel()) for v in automaton.of_kind(Kind.PARAMETER)}
+        self._fixed = {v.name: _value(v, v.start.ravel()) for v in automaton.of_kind(Kind.PARAMETER) if not v.tunable}
         self.breakpoints: FloatArray = np.zeros(0)
         self._inputs = self._input_sources(data, inputs or {})
 
@@ -160,10 +160,14 @@ class Subject:
         return np.concatenate([np.zeros((rows, 0)), *columns], axis=1)
 
     def _input_sources(self, data: Samples | HybridArc, given: Mapping[str, InputValue]) -> dict[str, InputAt]:
+        owner, parameters = self.automaton.name, {v.name: v for v in self.automaton.of_kind(Kind.PARAMETER)}
         variables = {v.name: v for v in self.automaton.of_kind(Kind.INPUT)}
         for name in given:
-            if name not in variables:
-                raise DeclarationError(unknown_input(self.automaton.name, name, variables))
+            if name in parameters:
+                require_tunable(owner, parameters[name], given[name])
+            elif name not in variables:
+                raise DeclarationError(unknown_input(owner, name, variables))
+        variables |= {name: variable for name, variable in parameters.items() if variable.tunable}
         sources = {}
         for name, variable in variables.items():
             if name in given:
@@ -175,16 +179,17 @@ class Subject:
         return sources
 
     def _given(self, variable: Variable, value: InputValue) -> InputAt:
+        # The sets are also looked at a little before and after a sample, where the user's function need not be defined.
+        known = self.samples.t[np.isfinite(self.samples.t)]
+        start, end = (float(known.min()), float(known.max())) if known.size else (-math.inf, math.inf)
         if isinstance(value, Signal):
-            self.breakpoints = np.union1d(self.breakpoints, np.asarray(value.breakpoints, dtype=np.float64))
-            function = value.value
+            own = np.unique(np.asarray(value.breakpoints, dtype=np.float64))
+            self.breakpoints = np.union1d(self.breakpoints, own)
+            function = _held(value.value, own, start) if variable.tunable else value.value
         elif callable(value):
             function = value
         else:
             return _constant(_input(variable, value))
-        # The sets are also looked at a little before and after a sample, where the user's function need not be defined.
-        known = self.samples.t[np.isfinite(self.samples.t)]
-        start, end = (float(known.min()), float(known.max())) if known.size else (-math.inf, math.inf)
         return lambda t, k: _input(variable, function(min(max(t, start), end)))
 
     def _sampled(self, variable: Variable, data: Samples | HybridArc) -> InputAt:
@@ -194,12 +199,12 @@ class Subject:
             return _constant(_value(variable, column[0]))
         # Anything may happen to an input at a sample, so nothing is integrated across one.
         self.breakpoints = np.union1d(self.breakpoints, t[np.isfinite(t)])
-        if isinstance(data, HybridArc) and not variable.discrete:
+        if isinstance(data, HybridArc) and not (variable.discrete or variable.tunable):
             return lambda time, k: _value(variable, data.at(variable.name, np.clip(time, t[0], t[-1])))
 
         def source(time: float, k: int) -> Any:
             length = t[k + 1] - t[k] if k + 1 < len(t) else 0.0
-            if variable.discrete or not length > 0.0:
+            if variable.discrete or variable.tunable or not length > 0.0:
                 return _value(variable, column[k])
             part = (time - t[k]) / length
             return _value(variable, (1.0 - part) * column[k] + part * column[k + 1])
@@ -238,6 +243,15 @@ def _input(variable: Variable, given: Any) -> Any:
 
 def _constant(value: Any) -> InputAt:
     return lambda t, k: value
+
+
+def _held(function: Callable[[float], Any], breakpoints: FloatArray, start: float) -> Callable[[float], Any]:
+    """Return the function that holds from the start, and from each breakpoint, what it is there."""
+
+    def value(t: float) -> Any:
+        return function(max([start, *breakpoints[breakpoints <= t].tolist()]))
+
+    return value
 
 
 def _vector(variables: list[Variable], assigned: Assignments, otherwise: FloatArray) -> FloatArray:

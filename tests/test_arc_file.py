@@ -195,7 +195,7 @@ def test_a_file_has_no_pickle_and_is_the_same_each_time(tmp_path):
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
     with np.load(tmp_path / "one.npz", allow_pickle=False) as file:
         assert str(file["schema"]) == "hybrid-fmu hybrid arc"
-        assert int(file["version"]) == 1
+        assert int(file["version"]) == 2
         assert json.loads(bytes(file["about"]))["variables"][0]["unit"] == "m"
 
 
@@ -218,7 +218,7 @@ def rewritten(path, **changes):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"version": np.array(2)}, "has version 2 of the schema, and this package reads version 1: install"),
+        ({"version": np.array(3)}, "has version 3 of the schema, and this package reads versions 1 to 2: install"),
         ({"schema": np.array("somebody's arc")}, "holds no hybrid arc: give a file that HybridArc.save has written"),
         ({"schema": None}, "holds no hybrid arc"),
         ({"points": None}, "is damaged: its parts do not fit together .*points"),

@@ -14,7 +14,10 @@ static bool may_be_set(const ModelVariable *variable, int mode)
     bool before_start = (mode & (MODE_INSTANTIATED | MODE_INITIALIZATION)) != 0;
     switch (variable->bank) {
     case BANK_INPUT: return mode != MODE_CONFIGURATION && (mode != MODE_INTERMEDIATE || !variable->discrete);
-    case BANK_PARAMETER:
+    /* Tunable parameters change at events from outside (2.0.5 and 3.0.2, section 2.2.7 and 2.4.7): in Event Mode, and at
+       communication points of Co-Simulation, with or without event mode (3.0.2, section 4.2.1), where the next step
+       handles what they bring about. */
+    case BANK_PARAMETER: return before_start || (variable->tunable && (mode & (MODE_EVENT | MODE_STEP)) != 0);
     case BANK_OPTION: return before_start;
     /* An importer that integrates may set a state by its name as well as all of them at once (2.0.1, section 3.2.3,
        condition 5; 3.0.2, section 3.2.1, by its table of functions and by what later became its text). */

@@ -55,6 +55,7 @@ typedef struct {
     uint8_t type, bank;
     bool discrete;         /* variability discrete (inputs, outputs) */
     bool calculated;       /* its start value is computed by `start`, so it cannot be set */
+    bool tunable;          /* a parameter that may be set at events and communication points */
 } ModelVariable;
 
 typedef struct {
