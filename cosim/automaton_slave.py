@@ -44,7 +44,8 @@ class AutomatonSlave(Slave):
             for port in ports[kind]
             if kind is Kind.OUTPUT or _is_output(automaton, port.name)
         ]
-        super().__init__(name, ports[Kind.INPUT], outputs, [clock.name for clock in automaton.clocks])
+        tunable = [e for v in automaton.of_kind(Kind.PARAMETER) if v.tunable for e in element_names(v)]
+        super().__init__(name, ports[Kind.INPUT], outputs, [clock.name for clock in automaton.clocks], tunable)
         self.automaton = automaton
         self._solver = solver
         self._whole = {e for v in automaton.variables if v.integer for e in element_names(v)}
@@ -52,6 +53,7 @@ class AutomatonSlave(Slave):
         self._predictable = all(port.discrete for port in ports[Kind.INPUT])
         self._starts: dict[str, float] = {}
         self._block: AutomatonBlock | None = None
+        self._begun = False
 
     @property
     def variable_names(self) -> list[str]:
@@ -68,6 +70,11 @@ class AutomatonSlave(Slave):
             raise MisfitError(f"{self.name}.{name} is set to {value}: set a finite number.")
         if name in self._whole and value != round(value):
             raise MisfitError(f"{self.name}.{name} is set to {value}, but it is an integer: set a whole number.")
+        if self._begun and name not in self.inputs and name not in self.tunable:
+            raise MisfitError(
+                f"{self.name}.{name} is fixed once the run has begun: set it before, or declare a parameter with "
+                "tunable=True."
+            )
         if self._block is None:
             self._starts[name] = value
         else:
@@ -91,6 +98,7 @@ class AutomatonSlave(Slave):
         """See `Slave.begin`."""
         self._running.run.compute_start()
         self._running.begin()
+        self._begun = True
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
@@ -122,7 +130,7 @@ class AutomatonSlave(Slave):
 
     def close(self) -> None:
         """See `Slave.close`."""
-        self._block = None
+        self._block, self._begun = None, False
 
     @property
     def _running(self) -> AutomatonBlock:

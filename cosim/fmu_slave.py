@@ -81,7 +81,7 @@ class FmuSlave(Slave):
             if variable.type == "Clock" and variable.causality == "output"
         }
         inputs, outputs = self._variables.ports("input"), self._variables.ports("output")
-        super().__init__(name, inputs, outputs, list(self._clock_references))
+        super().__init__(name, inputs, outputs, list(self._clock_references), self._variables.tunable)
         interface = description.coSimulation
         self.has_event_mode = bool(getattr(interface, "hasEventMode", False))
         self.can_restore = bool(interface.canGetAndSetFMUstate)
@@ -94,6 +94,7 @@ class FmuSlave(Slave):
         self._path = path
         self._loaded: FmuInstance | None = None
         self._running: FmuInstance | None = None
+        self._begun = False
         self._starts: dict[str, Any] = {}
         self._getters: dict[str, tuple[Callable[..., list[Any]], tuple[Any, ...], int]] = {}
         self._arrays: dict[str, list[Any]] = {}
@@ -111,6 +112,8 @@ class FmuSlave(Slave):
         if self._running is not None:
             if variable.causality == STRUCTURAL:
                 raise MisfitError(f"{self.name}.{name} is a structural parameter: set it before the run.")
+            if self._begun and variable.causality == "parameter" and name not in self.tunable:
+                raise MisfitError(f"{self.name}.{name} is a parameter that is not tunable: set it before the run.")
             self._write(name, held)
             return
         require_within(variable, held, f"{self.name}.{name}")
@@ -169,6 +172,7 @@ class FmuSlave(Slave):
     def begin(self) -> None:
         """See `Slave.begin`."""
         self._call(self._instance.exit_initialization)
+        self._begun = True
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
@@ -218,7 +222,7 @@ class FmuSlave(Slave):
         """See `Slave.close`."""
         if self._running is not None:
             self._running.free()
-            self._running = None
+            self._running, self._begun = None, False
 
     @property
     def _instance(self) -> FmuInstance:

@@ -47,6 +47,12 @@ class FmuVariables:
         """Return the inputs or the outputs."""
         return [port for v in self._variables if v.causality == causality for port in self._ports(v)]
 
+    @property
+    def tunable(self) -> list[str]:
+        """Names of the parameters that may be set at events and communication points."""
+        tunable = [v for v in self._variables if v.causality == "parameter" and v.variability == "tunable"]
+        return [name for variable in tunable for name in self._names(variable)]
+
     def _count(self) -> None:
         self.places = {
             name: (variable, place) for variable in self._variables for place, name in enumerate(self._names(variable))

@@ -50,6 +50,8 @@ class Slave(Block):
         Scalars by name; elements of vectors are separate, ``w[1]``.
     clocks : sequence of str
         Names of the output clocks.
+    tunable : sequence of str
+        Names of the parameters, scalars as well, that may be set during a run.
     """
 
     has_event_mode: bool
@@ -61,11 +63,19 @@ class Slave(Block):
     default_step: float | None = None
     """Times in s that the block proposes for a run: start, stop, and the step of communication."""
 
-    def __init__(self, name: str, inputs: Sequence[Port], outputs: Sequence[Port], clocks: Sequence[str]) -> None:
+    def __init__(
+        self,
+        name: str,
+        inputs: Sequence[Port],
+        outputs: Sequence[Port],
+        clocks: Sequence[str],
+        tunable: Sequence[str] = (),
+    ) -> None:
         self.name = name
         self.inputs: Mapping[str, Port] = {port.name: port for port in inputs}
         self.outputs: Mapping[str, Port] = {port.name: port for port in outputs}
         self.clocks = tuple(clocks)
+        self.tunable = tuple(tunable)
 
     @abstractmethod
     def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
@@ -85,12 +95,15 @@ class Slave(Block):
 
     @abstractmethod
     def set(self, name: str, value: Value) -> None:
-        """Set an input, or before `start` a start value or parameter.
+        """Set an input or a tunable parameter; until `begin` any parameter, and before `start` a start value.
+
+        What the change brings about happens at the present time: in the next `update` in event mode, else in the next
+        step, before time goes on.
 
         Raises
         ------
         MisfitError
-            If there is no such variable, or it does not hold the value exactly.
+            If there is no such variable, it does not hold the value exactly, or it is fixed by now.
         """
 
     @abstractmethod

@@ -78,6 +78,26 @@ class System:
         slave, port = self._outputs[name]
         return slave.get(port)
 
+    def settable(self, name: str) -> tuple[str, str]:
+        """Return the slave and the variable that ``slave.variable`` names, if somebody outside may set it in a run.
+
+        Raises
+        ------
+        MisfitError
+            If it is neither an input without a connection nor a tunable parameter.
+        """
+        slave, variable = self._owner(name)
+        driving = next((c for c in self.connections if (c.target, c.input) == (slave.name, variable)), None)
+        if driving is not None:
+            raise MisfitError(f"{name} cannot be given a value, for {driving} drives it: leave one of them out.")
+        if variable not in slave.inputs and variable not in slave.tunable:
+            known = ", ".join([*slave.inputs, *slave.tunable]) or "none"
+            raise MisfitError(
+                f"{name} is neither an input nor a tunable parameter, so it cannot be set in a run; those of "
+                f"{slave.name} are {known}."
+            )
+        return slave.name, variable
+
     def close(self) -> None:
         """Free everything the slaves hold."""
         for slave in self.slaves.values():

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from cosim.errors import CosimError, MisfitError
+from cosim.masters.changes import Changes, Given
 from cosim.masters.start import outputs, require_times, sample, sample_end, start_slaves
 from cosim.result import CosimResult
 from cosim.system import System
@@ -16,7 +18,12 @@ ROUNDING = 1e-12
 
 
 def run_event_exact(
-    system: System, t_stop: float, *, t_start: float = 0.0, output_interval: float | None = None
+    system: System,
+    t_stop: float,
+    *,
+    t_start: float = 0.0,
+    output_interval: float | None = None,
+    inputs: Mapping[str, Given] | None = None,
 ) -> CosimResult:
     """Run a system whose slaves exchange discrete signals only, each event at its exact time.
 
@@ -28,6 +35,9 @@ def run_event_exact(
         Times in s.
     output_interval : float, optional
         Record all outputs at multiples of this time; default: only at the end.
+    inputs : mapping, optional
+        ``"slave.variable"`` -> number or `hybrid_model.Signal`, for inputs that nothing drives and tunable parameters.
+        A signal is asked at the start and at its breakpoints, each of which is an event, and held between.
 
     Returns
     -------
@@ -37,20 +47,21 @@ def run_event_exact(
     Raises
     ------
     MisfitError
-        If a connection carries a continuous signal or a slave has no event mode.
+        If a connection carries a continuous signal, a slave has no event mode, or a name of `inputs` cannot be set.
     CosimError
         If a slave fails, or asks for event iterations without end.
     """
     require_times(t_start, t_stop, output_interval, "output interval")
     _require_discrete(system)
+    changes = Changes(system, inputs or {}, t_start)
     scheduler = Scheduler(system.slaves, system.from_slave, t_start)
     result = CosimResult(t=t_start, ticks=scheduler.ticks, events=scheduler.events)
     try:
-        start_slaves(system, t_start, t_stop, events=True)
+        start_slaves(system, t_start, t_stop, events=True, changes=changes)
         scheduler.handle_events(t_start, system.slaves)
         if output_interval is not None:
             sample(system, result, t_start, system.output_names)
-        _advance(scheduler, system, result, t_stop, output_interval)
+        _advance(scheduler, system, result, t_stop, output_interval, changes)
         if scheduler.ended and output_interval is not None:
             sample_end(system, result, scheduler.ended[1], system.output_names)
         result.final = outputs(system)
@@ -65,18 +76,37 @@ def run_event_exact(
 
 
 def _advance(
-    scheduler: Scheduler, system: System, result: CosimResult, t_stop: float, output_interval: float | None
+    scheduler: Scheduler,
+    system: System,
+    result: CosimResult,
+    t_stop: float,
+    output_interval: float | None,
+    changes: Changes,
 ) -> None:
     t_start = scheduler.t
     # A last point that rounding puts before the stop time is the stop time.
     count = 1 if output_interval is None else math.ceil((t_stop - t_start) / output_interval * (1.0 - ROUNDING))
     for k in range(1, count + 1):
         grid = t_stop if output_interval is None or k == count else t_start + k * output_interval
+        _change_on_the_way(scheduler, system, grid, changes)
         scheduler.advance_to(grid)
         if scheduler.ended:
             return
         if output_interval is not None:
             sample(system, result, grid, system.output_names)
+
+
+def _change_on_the_way(scheduler: Scheduler, system: System, limit: float, changes: Changes) -> None:
+    """Set what changes up to `limit` in s, each time as an event of the slaves concerned."""
+    while not scheduler.ended and (due := changes.next_time(limit)) is not None:
+        scheduler.advance_to(due)
+        if scheduler.ended:
+            return
+        changed = changes.take(due)
+        for slave, names in changed.items():
+            system.slaves[slave].enter_event_mode()
+            changes.set(names, due)
+        scheduler.handle_events(due, changed)
 
 
 def _require_discrete(system: System) -> None:

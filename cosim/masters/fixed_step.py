@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from cosim.errors import CosimError, MisfitError
+from cosim.masters.changes import Changes, Given
 from cosim.masters.start import outputs, require_times, sample, sample_end, start_slaves
 from cosim.result import CosimResult
 from cosim.system import System
@@ -22,6 +23,7 @@ def run_fixed_step(
     t_start: float = 0.0,
     record: Sequence[str] = (),
     output_interval: float | None = None,
+    inputs: Mapping[str, Given] | None = None,
 ) -> CosimResult:
     """Run a system with a fixed communication step; slaves handle their events inside.
 
@@ -40,6 +42,10 @@ def run_fixed_step(
     output_interval : float, optional
         Keep them at multiples of this time in s, which is a multiple of the step, and at the end; default: at every
         communication point.
+    inputs : mapping, optional
+        ``"slave.variable"`` -> number or `hybrid_model.Signal`, for inputs that nothing drives and tunable parameters.
+        A signal is asked at the start and at its breakpoints, and its values arrive at the communication point there
+        or, where there is none, at the next.
 
     Returns
     -------
@@ -51,7 +57,7 @@ def run_fixed_step(
     CosimError
         If a slave fails or the times make no sense.
     MisfitError
-        If the last step is shorter, and a slave takes steps of one length only.
+        If the last step is shorter, and a slave takes steps of one length only, or if a name of `inputs` cannot be set.
     """
     require_times(t_start, t_stop, step, "communication step")
     require_times(t_start, t_stop, output_interval, "output interval")
@@ -60,9 +66,10 @@ def run_fixed_step(
     count = math.ceil((t_stop - t_start) / step * (1.0 - 1e-14))
     _require_constant(system, t_stop - t_start, count, step)
     every = 1 if output_interval is None else _steps_between(output_interval, step)
+    changes = Changes(system, inputs or {}, t_start)
     result = CosimResult(t=t_start)
     try:
-        start_slaves(system, t_start, t_stop, events=False)
+        start_slaves(system, t_start, t_stop, events=False, changes=changes)
         sample(system, result, t_start, record)
         # Time by index: adding up steps would drift (rule 9).
         for k in range(1, count + 1):
@@ -72,6 +79,8 @@ def run_fixed_step(
             if k % every == 0 or k == count:
                 sample(system, result, result.t, record)
             _exchange(system)
+            for names in changes.take(result.t).values():
+                changes.set(names, result.t)
         result.final = outputs(system)
     finally:
         system.close()

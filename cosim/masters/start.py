@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from cosim.errors import CosimError
+from cosim.masters.changes import Changes
 from cosim.result import CosimResult
 from cosim.system import System
 
@@ -38,8 +39,8 @@ def require_times(t_start: float, t_stop: float, interval: float | None, what: s
         )
 
 
-def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool) -> None:
-    """Bring all slaves through initialization mode, start values transferred along the connections.
+def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool, changes: Changes) -> None:
+    """Bring all slaves through initialization mode: values from outside first, then those along the connections.
 
     Raises
     ------
@@ -48,6 +49,7 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool)
     """
     for slave in system.slaves.values():
         slave.start(t_start, t_stop, events=events)
+    changes.set_start_values()
     known: dict[tuple[str, str], float] = {}
     # A chain of n slaves needs n rounds, and one more to see that nothing changes.
     for _ in range(len(system.slaves) + 1):

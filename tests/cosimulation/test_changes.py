@@ -1,0 +1,121 @@
+"""What masters set from outside in a run: tunable parameters, and inputs that nothing drives."""
+
+import pytest
+from tuned import BOUNCES, ROUNDS, T_END, TICKS, Tuned, exact, signals
+
+import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
+from cosim.errors import CosimError, MisfitError
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_event_exact, run_fixed_step
+from cosim.system import System
+
+CLOCKS = {"round_clock": ROUNDS, "tick_clock": TICKS, "bounce_clock": BOUNCES}
+GIVEN = {f"block.{name}": signal for name, signal in signals().items()}
+
+
+@pytest.fixture(params=["automaton", "FMU 3.0", "FMU 2.0"])
+def block(request, exported):
+    if request.param == "automaton":
+        return AutomatonSlave("block", Tuned())
+    return FmuSlave("block", exported(Tuned(), "tuned-tuned", request.param[-3:]))
+
+
+class Counter(hm.HybridAutomaton):
+    """Counts what it hears."""
+
+    heard = hm.Input(0.0, discrete=True)
+    counted = hm.DiscreteState(0.0, output=True)
+    ticks = hm.Clock("jump")
+
+    def jump_set(self, s):
+        return abs(s.heard - s.counted) - 0.5
+
+    def jump_map(self, s):
+        return {"counted": s.heard}
+
+
+def test_each_change_is_an_event_of_the_event_exact_master(block):
+    if not block.has_event_mode:
+        pytest.skip("FMI 2.0 has no event mode in Co-Simulation")
+    system = System([block, AutomatonSlave("counter", Counter())], {"counter.heard": "block.rounds"})
+    result = run_event_exact(system, T_END, inputs=GIVEN)
+    for clock, times in CLOCKS.items():
+        assert [tick.t for tick in result.ticks if tick.clock == clock] == pytest.approx(times, abs=1e-9)
+    assert [tick.t for tick in result.ticks if tick.slave == "counter"] == pytest.approx(ROUNDS, abs=1e-9)
+    for name, value in exact(T_END).items():
+        assert result.final[f"block.{name}"] == pytest.approx(value, abs=1e-9)
+    # Values of one run are not the start values of the next.
+    assert run_event_exact(system, 0.4).final["block.weight"] == 16.0
+
+
+def test_changes_arrive_at_communication_points_of_the_fixed_step_master(block):
+    t_end = 0.8
+    system = System([block], {})
+    result = run_fixed_step(system, t_end, 0.05, record=["block.rounds", "block.ticks"], inputs=GIVEN)
+    for name, value in exact(t_end).items():
+        assert result.final[f"block.{name}"] == pytest.approx(value, abs=1e-9)
+    # What a change makes due happens in the next step, at its beginning.
+    assert result.signals["block.rounds"] == [sum(at < t - 1e-9 for at in ROUNDS) for t in result.times]
+    # A change between two points arrives at the next: a round at 0.4 s and one at 0.7 s.
+    fall = hm.Signal(lambda t: 1.0 if t < 0.35 else 0.3, [0.35])
+    late = run_fixed_step(system, t_end, 0.4, inputs={"block.limit": fall})
+    assert late.final["block.rounds"] == 2
+    assert late.final["block.x"] == pytest.approx(0.1, abs=1e-9)
+
+
+def test_an_input_that_nothing_drives_is_given_as_well():
+    counter = AutomatonSlave("counter", Counter())
+    steps = hm.Signal(lambda t: 1.0 * (t >= 0.3) + 1.0 * (t >= 0.7), [0.3, 0.7])
+    result = run_event_exact(System([counter], {}), 1.0, inputs={"counter.heard": steps})
+    assert [tick.t for tick in result.ticks] == [0.3, 0.7]
+    assert run_event_exact(System([counter], {}), 1.0, inputs={"counter.heard": 3.0}).final["counter.counted"] == 3.0
+
+
+def test_a_slave_is_tuned_between_steps_and_in_event_mode(block):
+    events = block.has_event_mode
+    block.start(0.0, 1.0, events=events)
+    block.begin()
+    if events:
+        while block.update().again:
+            pass
+        block.enter_step_mode()
+    block.step(0.0, 0.4)
+    block.set("limit", 0.25)
+    made = block.step(0.4, 0.5)
+    # The ramp stands at 0.4: it starts anew at that instant, not at the end of the step.
+    assert (made.reached, made.event) == ((0.4, True) if events else (0.5, made.event))
+    if events:
+        block.enter_event_mode()
+        assert block.update().next_event == pytest.approx(0.45, abs=1e-9)
+        block.set("slope", 10.0)
+        assert block.update().next_event == pytest.approx(0.425, abs=1e-9)
+    assert block.get("rounds") == 1
+    assert block.get("x") == pytest.approx(0.0 if events else 0.1, abs=1e-9)
+    block.close()
+
+
+@pytest.mark.parametrize("name", ["mass", "rounds"])
+def test_what_is_fixed_is_not_set_in_a_run(block, name):
+    block.set(name, 1.0)
+    block.start(0.0, 1.0, events=block.has_event_mode)
+    block.begin()
+    with pytest.raises((CosimError, MisfitError), match=r"fixed once|not tunable|cannot be set"):
+        block.set(name, 2.0)
+    block.close()
+
+
+def test_names_and_values_that_cannot_be(block):
+    system = System([block, AutomatonSlave("counter", Counter())], {"counter.heard": "block.rounds"})
+    for name, message in (
+        ("block.mass", "neither an input nor a tunable parameter, .*of block are slope, limit, period, g, e"),
+        ("counter.heard", "cannot be given a value, for block.rounds -> counter.heard drives it"),
+        ("nobody.limit", "names no slave"),
+    ):
+        with pytest.raises(MisfitError, match=message):
+            run_fixed_step(system, 1.0, 0.1, inputs={name: 1.0})
+    for value in ([1.0, 2.0], float("nan"), "high"):
+        with pytest.raises(MisfitError, match=r"block\.limit"):
+            run_fixed_step(system, 1.0, 0.1, inputs={"block.limit": value})
+    with pytest.raises(MisfitError, match="finite times"):
+        run_fixed_step(system, 1.0, 0.1, inputs={"block.limit": hm.Signal(lambda t: 1.0, [float("inf")])})
