@@ -46,6 +46,7 @@ def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> 
         "resources": resource_location(folder, description.major),
         "token": description.token,
         "variables": [entry(description, variable) for variable in description.variables],
+        "clocks": any(variable.type == "Clock" for variable in description.variables),
         "event_mode": kind == "CoSimulation" and true(attributes, "hasEventMode"),
         "variable_step": true(attributes, "canHandleVariableCommunicationStepSize"),
         "once": true(attributes, "canBeInstantiatedOnlyOncePerProcess"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import PurePosixPath
 
 from fmu.check import functions
 from fmu.check.archive import Archive
@@ -64,33 +65,14 @@ def _folder(archive: Archive, description: Description, folder: str, files: list
             PLACES,
         )
     machine, system, interface = platform
-    for kind, attributes in description.interfaces.items():
-        identifier = attributes.get("modelIdentifier", "")
-        name = f"binaries/{folder}/{identifier}{EXTENSIONS[system]}"
-        static = any(
-            file.startswith(f"binaries/{folder}/{identifier}.") and file.endswith((".a", ".lib")) for file in files
-        )
-        if name in files:
-            continue
-        if static or interface:
-            yield note(
-                "binary.static",
-                f"binaries/{folder} holds a static library for {kind}: it has not been looked at.",
-                PLACES,
-            )
-        else:
-            yield error(
-                "binary.missing",
-                f"{name} is missing, which {kind} has by its modelIdentifier: importers on {folder} look for "
-                "just this name.",
-                PLACES,
-            )
     by_file: dict[str, dict[str, Mapping[str, str]]] = {}
     for kind, attributes in description.interfaces.items():
         name = f"binaries/{folder}/{attributes.get('modelIdentifier', '')}{EXTENSIONS[system]}"
-        if name in files:
-            by_file.setdefault(name, {})[kind] = attributes
+        by_file.setdefault(name, {})[kind] = attributes
     for name, kinds in by_file.items():
+        if name not in files:
+            yield _missing(archive, name, files, " and ".join(kinds), static=bool(interface))
+            continue
         if archive.size(name) > LARGEST:
             yield note("binary.large", f"{name} is larger than {LARGEST} bytes: it has not been looked at.")
             continue
@@ -103,6 +85,30 @@ def _folder(archive: Archive, description: Description, folder: str, files: list
             continue
         yield from _library(name, binary, machine, system)
         yield from _symbols(name, binary, description, kinds)
+
+
+def _missing(archive: Archive, name: str, files: list[str], kinds: str, *, static: bool) -> Finding:
+    """Return what it means that a folder lacks the shared library of some interface types."""
+    folder, identifier = name.rpartition("/")[0], PurePosixPath(name).stem
+    if static or any(file.startswith(f"{folder}/{identifier}.") and file.endswith((".a", ".lib")) for file in files):
+        text = f"{folder} holds a static library for {kinds}: it has not been looked at."
+        return note("binary.static", text, PLACES)
+    # A folder of other files, where another platform has its binary, is a platform that is not supported.
+    misnamed = any(file.endswith(PurePosixPath(name).suffix) for file in files)
+    return (error if misnamed or not _supported(archive, identifier) else warning)(
+        "binary.missing",
+        f"{name} is missing, which {kinds} asks for by its modelIdentifier: importers look for just this name.",
+        PLACES,
+    )
+
+
+def _supported(archive: Archive, identifier: str) -> bool:
+    """Tell whether some platform has a binary of that name."""
+    platforms = [(name.split("/"), parts_of(name.split("/")[1])) for name in archive.names if name.count("/") == 2]
+    return any(
+        parts[0] == "binaries" and platform is not None and parts[2] == f"{identifier}{EXTENSIONS[platform[1]]}"
+        for parts, platform in platforms
+    )
 
 
 def _has_name_in_fmi2(platform: tuple[str, str, str]) -> bool:
@@ -169,7 +175,7 @@ def _symbols(
     for runtime, pattern in _RUNTIMES.items():
         wanted = sorted(symbol for symbol in binary.imports if pattern.fullmatch(symbol))
         if wanted:
-            yield error(
+            yield warning(
                 "symbol.runtime",
                 f"{name} needs {wanted[0]} and {len(wanted) - 1} more functions of {runtime}: it loads only "
                 "into a process, or "

@@ -15,6 +15,7 @@ from fmu.check.platforms import EXTENSIONS, parts_of, runs_here, this_machine
 
 MISUSE = ("token", "bad steps")
 """Experiments that do what no importer does."""
+WITHOUT_EVENT_MODE = "life cycle without event mode"
 _NOT_LOADED = ("run.load", "run.library")
 
 
@@ -67,8 +68,9 @@ def _run_kind(
     found: list[tuple[str, Finding]] = []
     for name, changes in experiments.items():
         here = list(run_experiment({**plan, **changes}, limits))
-        # Of an FMU that is given what no importer gives, only robustness is learned.
-        found += [(name, softened(finding) if name in MISUSE else finding) for finding in here]
+        # Of an FMU that is given what no importer gives, only robustness is learned; clocks need Event Mode.
+        soft = name in MISUSE or (name == WITHOUT_EVENT_MODE and plan["clocks"])
+        found += [(name, softened(finding) if soft else finding) for finding in here]
         if any(finding.rule in _NOT_LOADED for finding in here):
             break
     return found
@@ -108,7 +110,7 @@ def _experiments(kind: str, attributes: Any) -> dict[str, dict[str, Any]]:
     }
     if kind == "CoSimulation" and true(attributes, "hasEventMode"):
         # Most importers leave event mode off: the FMU then handles its events inside.
-        experiments["life cycle without event mode"] = {"experiment": "life_cycle", "event_mode": False}
+        experiments[WITHOUT_EVENT_MODE] = {"experiment": "life_cycle", "event_mode": False}
     if true(attributes, "canGetAndSetFMUstate") or true(attributes, "canGetAndSetFMUState"):
         experiments["state"] = {"experiment": "state"}
     if kind == "CoSimulation":

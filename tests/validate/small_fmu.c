@@ -121,16 +121,19 @@ static int step(State* s, double t, double h) {
 #elif !defined(FAULT_ANY_STEP)
     if (!(h > 0.0)) return ERROR;
 #endif
-    s->x += (-s->rate * s->x + s->u) * h - 1e-9 * s->memory;
+    s->x += (-s->rate * s->x + s->u) * h - 1e-3 * s->memory;
     s->memory += h;
     s->t = t + h;
+#ifndef REPEATED
+#define REPEATED 1e-3
+#endif
 #ifdef FAULT_REPEAT
     static int calls;
-    s->x += 1e-15 * calls++;
+    s->x += REPEATED * calls++;
 #endif
     s->calls++;
 #ifdef FAULT_STATE
-    s->x += 1e-12 * (s->calls % 7);
+    s->x += 1e-3 * (s->calls % 7);
 #endif
     return OK;
 }
@@ -270,7 +273,7 @@ API int fmi3DeserializeFMUState(State* s, const uint8_t* in, size_t n, void** ou
     copy(s, out);
     memcpy(*out, in, n);
 #ifdef FAULT_SERIALIZE
-    ((State*)*out)->x += 1e-9;
+    ((State*)*out)->x += 1e-3;
 #endif
     return OK;
 }

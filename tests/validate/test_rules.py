@@ -340,6 +340,12 @@ def test_names_of_platforms_are_those_of_the_standards(folder, parts):
     assert parts_of(folder) == parts
 
 
+@pytest.mark.parametrize(("file", "severity"), [("readme.txt", Severity.WARNING), ("other.dll", Severity.ERROR)])
+def test_a_platform_without_its_binary_is_no_fault_of_the_others(file, severity, tmp_path):
+    report = check(tmp_path, DESCRIPTIONS[3], {f"binaries/x86-windows/{file}": b""})
+    assert [finding.severity for finding in report.findings if finding.rule == "binary.missing"] == [severity]
+
+
 def test_darwin32_is_a_name_of_fmi_2(tmp_path):
     for major, rules in ((2, set()), (3, {"binary.platform"})):
         files = {"modelDescription.xml": DESCRIPTIONS[major], "binaries/darwin32/small.dylib": b""}

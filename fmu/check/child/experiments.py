@@ -11,16 +11,15 @@ from typing import Any
 
 from fmu.check.child.calls import OK, WARNING, Recorder, Stopped
 from fmu.check.child.claims import element_dependencies, evaluation, input_derivatives, output_orders
+from fmu.check.child.comparison import Whole, compare
 from fmu.check.child.dependencies import dependencies
 from fmu.check.child.fmi2 import Fmi2
 from fmu.check.child.fmi3 import Fmi3
-from fmu.check.child.run import Bits, Run
+from fmu.check.child.run import Run
 from fmu.check.child.runs import instantiate, run_of
 from fmu.check.child.start_values import start_values
 
-Whole = tuple[list[bytes], list[Bits], bool]
-"""Values at the start, outputs at each point, and whether the FMU has ended the run."""
-POINTS = 200
+POINTS = 400
 """Communication points of a run at most."""
 
 
@@ -30,13 +29,13 @@ def life_cycle(fmu: Any, recorder: Recorder) -> None:
     first = _whole(fmu, recorder)
     fmu.do("Reset")
     second = _whole(fmu, recorder)
-    _compare(fmu, "run.reset", "after a reset", first, second)
+    compare(fmu, "run.reset", "after a reset", first, second)
     fmu.do("Terminate") if not second[2] else None
     fmu.free()
     if not fmu.plan["once"]:
         instantiate(fmu, recorder)
         third = _whole(fmu, recorder)
-        _compare(fmu, "run.repeat", "in a second instance", first, third)
+        compare(fmu, "run.repeat", "in a second instance", first, third)
         fmu.free()
 
 
@@ -55,7 +54,7 @@ def state(fmu: Any, recorder: Recorder) -> None:
     saved, mark = fmu.save(), run.mark()
     here, onward = run.read_all(), run.advance(rest)
     _back(fmu, run, saved, mark)
-    _compare(
+    compare(
         fmu,
         "run.state",
         "after the state was set again",
@@ -73,7 +72,7 @@ def state(fmu: Any, recorder: Recorder) -> None:
         copy = fmu.deserialize(content)
         _back(fmu, run, copy, mark)
         found = (run.read_all(), run.advance(rest), False)
-        _compare(fmu, "run.serialize", "after the state was set from bytes", (here, onward, False), found)
+        compare(fmu, "run.serialize", "after the state was set from bytes", (here, onward, False), found)
         fmu.release(copy)
     fmu.release(saved)
     fmu.free()
@@ -135,8 +134,8 @@ def derivatives(fmu: Any, recorder: Recorder) -> None:
         if any(math.isnan(slope) for slope in row):
             text = f"A directional derivative of {unknown!r} is NaN: {row[:10]}."
             recorder.find("warning", "run.derivative", text)
-        elif not _close(fmu.directional([reference], knowns, [2.0] * len(knowns))[0], 2.0 * sum(row), row):
-            text = f"The directional derivatives of {unknown!r} do not add up: they must be linear in the seed."
+        elif not _homogeneous(fmu, reference, knowns, row):
+            text = f"Seeds twice as large do not double the directional derivative of {unknown!r}: it must be linear."
             recorder.find("error", "run.derivative", text)
         elif fmu.plan["adjoint"]:
             column = fmu.directional([reference], knowns, [1.0], adjoint=True)
@@ -149,9 +148,15 @@ def derivatives(fmu: Any, recorder: Recorder) -> None:
     fmu.free()
 
 
-def _close(first: float, second: float, scale: list[float]) -> bool:
-    # Sums in another order differ by rounding only.
-    return math.isclose(first, second, rel_tol=1e-9, abs_tol=1e-9 * max(1.0, *map(abs, scale)))
+def _homogeneous(fmu: Any, reference: int, knowns: list[int], row: list[float]) -> bool:
+    # Differences to one side, which the standard allows, do not add up where the model has a kink.
+    one, two = (fmu.directional([reference], knowns, [seed] * len(knowns))[0] for seed in (1.0, 2.0))
+    return _close(two, 2.0 * one, row)
+
+
+def _close(first: float, second: float, row: list[float]) -> bool:
+    """Tell whether two sums over a row of the Jacobian are equal up to what differences of a solver's values give."""
+    return math.isclose(first, second, rel_tol=1e-3, abs_tol=1e-3 * sum(map(abs, row)) + 1e-6)
 
 
 EXPERIMENTS = {
@@ -180,29 +185,6 @@ def _whole(fmu: Any, recorder: Recorder) -> Whole:
 def _back(fmu: Any, run: Run, saved: Any, mark: tuple[Any, ...]) -> None:
     fmu.restore(saved)
     run.back(mark)
-
-
-def _compare(fmu: Any, rule: str, when: str, expected: Whole, found: Whole) -> None:
-    """Hold two runs against each other: values at the start, outputs at each point, and where they end."""
-    first = _difference(expected[0], found[0])
-    if first is not None:
-        names = [variable.name for variable in fmu.variables if variable.readable]
-        fmu.recorder.find("error", rule, f"The variable {names[first]!r} has another value {when} than at first.")
-        return
-    place = _difference(expected[1], found[1])
-    if place is not None:
-        t = expected[1][place][0]
-        text = f"The outputs {when} differ from those at first, from t = {t!r} on: not one bit may."
-        fmu.recorder.find("error", rule, text)
-    elif len(expected[1]) != len(found[1]):
-        one, other = (f"at t = {points[-1][0]!r}" if points else "at its start" for points in (expected[1], found[1]))
-        text = f"The run {when} ends {other}, the first one {one}: they must be equal."
-        fmu.recorder.find("error", rule, text)
-
-
-def _difference(expected: list[Any], found: list[Any]) -> int | None:
-    pairs = zip(expected, found, strict=False)
-    return next((number for number, (one, other) in enumerate(pairs) if one != other), None)
 
 
 def main(plan_path: str) -> int:
