@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from dataclasses import replace
 
 from fmu.description_names import xml_text
 from fmu.description_parts import (
@@ -125,12 +126,23 @@ def _variable(listed: ET.Element, description: Description, reference: int) -> N
 
 def _structure(structure: ET.Element, description: Description) -> None:
     found = description.structure
-    lists = {"Outputs": found.outputs, "Derivatives": found.derivatives, "InitialUnknowns": found.initial}
+    outputs, derivatives = (_running(description, unknowns) for unknowns in (found.outputs, found.derivatives))
+    lists = {"Outputs": outputs, "Derivatives": derivatives, "InitialUnknowns": found.initial}
     for tag, unknowns in lists.items():
         if unknowns:
             element = ET.SubElement(structure, tag)
             for unknown in unknowns:
                 _unknown(element, unknown)
+
+
+def _running(description: Description, unknowns: Sequence[Unknown]) -> list[Unknown]:
+    """Leave out the tunable parameters, which FMI 2.0 does not count among the knowns of a running FMU."""
+    shown = []
+    for unknown in unknowns:
+        kept = [k for k, at in enumerate(unknown.dependencies) if not description.variables[at].tunable]
+        kinds = unknown.kinds and tuple(unknown.kinds[k] for k in kept)
+        shown.append(replace(unknown, dependencies=tuple(unknown.dependencies[k] for k in kept), kinds=kinds))
+    return shown
 
 
 def _unknown(element: ET.Element, unknown: Unknown) -> None:

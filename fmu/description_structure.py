@@ -2,9 +2,9 @@
 
 Discrete outputs depend on what decides about the next jump as well: in Event Mode they show its outcome.
 
-What may be listed as known (3.0, section 2.4.8; 2.0, section 2.2.8): while the FMU runs inputs, continuous states and
-time; in Initialization Mode inputs, time, and everything whose start value can be set. Parameters and discrete states
-do not change between events, so they are no knowns of a running FMU.
+What is listed as known (3.0, section 2.4.8; 2.0, section 2.2.8): while the FMU runs inputs, continuous states, time,
+and, in FMI 3.0, tunable parameters; in Initialization Mode inputs, time, and everything whose start value can be set.
+Fixed parameters do not change while it runs, and nobody outside can change discrete states, so they are left out.
 """
 
 from __future__ import annotations
@@ -75,7 +75,8 @@ def model_structure(traced: Any, variables: Sequence[FmuVariable]) -> Structure:
         Outputs and indicators in the order of the table, derivatives in the order of the state vector.
     """
     maps = _Maps(traced)
-    running = maps.dependencies(variables, [v.bank in (Bank.TIME, Bank.INPUT, Bank.STATE) for v in variables])
+    moving = [v.tunable or v.bank in (Bank.TIME, Bank.INPUT, Bank.STATE) for v in variables]
+    running = maps.dependencies(variables, moving)
     settable = [v.bank in (Bank.TIME, Bank.INPUT) or v.initial == "exact" for v in variables]
     # Parameters and discrete states are knowns at the start: a factor that holds one is not a fixed factor there.
     starting = maps.at_start().dependencies(variables, settable, kept=(Factor.CONSTANT,))

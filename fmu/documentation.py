@@ -77,7 +77,7 @@ def index_page(description: Description, fmi: Fmi, related: Sequence[str] = ()) 
         *_jumps(description),
         *_clocks(description),
         "<h2>Events</h2>",
-        *(f"<p>{_text(paragraph)}</p>" for paragraph in _EVENTS[fmi]),
+        *(f"<p>{_text(paragraph)}</p>" for paragraph in (*_EVENTS[fmi], *_tuning(description, fmi))),
         *_related(related),
     ]
     head = f'<meta charset="utf-8"/>\n<title>{name}</title>\n<style>{_STYLE}</style>'
@@ -132,12 +132,28 @@ def _variables(description: Description) -> list[str]:
 def _row(name: str, variable: FmuVariable) -> tuple[str, ...]:
     shape = f" ({' by '.join(map(str, variable.shape))})" if variable.shape else ""
     kind = variable.causality if variable.causality != "structuralParameter" else "length of arrays"
-    if variable.causality in ("input", "output", "local"):
+    if variable.causality in ("input", "output", "local") or variable.tunable:
         kind = f"{variable.variability} {kind}"
     start = "" if variable.start is None else start_text(variable)
     if variable.start is not None and len(variable.start) > 8:
         start = " ".join([*(number(value) for value in variable.start[:8]), "..."])
     return name, kind, _TYPES[variable.type] + shape, variable.unit, start, variable.description
+
+
+def _tuning(description: Description, fmi: Fmi) -> list[str]:
+    """Say when tunable parameters may be set, if there are any."""
+    if not any(variable.tunable for variable in description.variables):
+        return []
+    kinds = {
+        "cs": "between two steps in Co-Simulation" + (", or in its Event Mode" if fmi is Fmi.V3_0 else ""),
+        "me": "in Event Mode in Model Exchange",
+    }
+    places = "; ".join(text for kind, text in kinds.items() if kind in description.kinds)
+    return [
+        f"Tunable parameters may be set while the FMU runs: {places}. A change is an event: the next event is foretold "
+        "anew, and a jump that the change makes due is taken at that instant, in Co-Simulation without event mode at "
+        "the beginning of the next step. Start values that were computed stay."
+    ]
 
 
 def _jumps(description: Description) -> list[str]:

@@ -52,6 +52,9 @@ Answer instance_update(void *handle, const char *function, EventUpdate *update)
     Run *run = instance->run;
     bool changed = false;
     *update = (EventUpdate){.terminate = !engine_jump(engine, &changed)};
+    /* True only where a value is another one: 2.0.5, section 3.2.2, forbids it elsewhere, and in 3.0.2, section 2.3.5,
+       it says that a state was re-initialised to another value.  So a jump that changes nothing but the mode of the flow
+       is not told apart from none, and an importer restarts its solver after every event. */
     update->states_changed = changed;
     update->again = !update->terminate && engine_pending(engine) < model.n_jumps;
     /* This iteration's clocks are over; the next one's are those of the jump that comes next. */

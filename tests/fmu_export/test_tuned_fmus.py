@@ -1,6 +1,7 @@
 """Tunable parameters of FMUs: set at events and communication points, in both versions and in every way of use."""
 
 import itertools
+import zipfile
 
 import pytest
 from fmu_driver2 import ERROR, OK, Binary, Component
@@ -8,6 +9,8 @@ from own_importer import exchange, step_through
 from tuned import CHANGES, JUMPS, POINTS, T_END, TIMES, Tuned, TunedAndDriven, exact
 
 import hybrid_model as hm
+from fmu.check.findings import Severity
+from fmu.check.fmu_file import check_fmu
 from fmu.network import worth_looping
 
 # The engine locates to the last bits; own_importer integrates Model Exchange to 1e-12 and bisects.
@@ -216,6 +219,21 @@ def test_the_description_says_which_are_tunable(fmi, path):
     [output] = [u for u in binary.description.outputs if u.variable.name == "rest"]
     kinds = {v.name: kind for v, kind in zip(output.dependencies, output.dependenciesKind, strict=True)}
     assert kinds["x"] == "tunable"
+    # rest = 1 - x / limit; FMI 2.0 has no parameters among the knowns of a running FMU.
+    assert kinds == {"x": "tunable"} | ({"limit": "dependent"} if fmi == "3.0" else {})
+    [weight] = [u for u in binary.description.outputs if u.variable.name == "weight"]
+    assert [v.name for v in weight.dependencies] == (["g"] if fmi == "3.0" else [])
+    [fall] = [u for u in binary.description.derivatives if u.variable.name == "der(v)"]
+    assert [v.name for v in fall.dependencies] == (["g"] if fmi == "3.0" else [])
+
+
+@VERSIONS
+def test_the_checker_and_the_page_know_them(fmi, path):
+    assert {finding.severity for finding in check_fmu(path(fmi)).findings} <= {Severity.NOTE}
+    with zipfile.ZipFile(path(fmi)) as archive:
+        page = archive.read("documentation/index.html").decode()
+    assert page.count("tunable parameter") == len(CHANGES)
+    assert "may be set" in page
 
 
 def network():
