@@ -166,6 +166,23 @@ def test_time_events_are_announced_at_their_exact_times(fmi, make):
 
 
 @VERSIONS
+def test_states_count_as_changed_only_where_a_jump_gives_them_another_value(fmi, make):
+    """The standards forbid to say so elsewhere, also for a jump that changes what the flow map depends on."""
+    component = make("mix", fmi)
+    update, told = component.begin(), {}
+    for _ in range(3):
+        component.do("SetTime", c.c_double(update.next_time))
+        before = component.vector("GetContinuousStates", 2)[1]
+        component.do("EnterEventMode")
+        update = component.settle()
+        told[round(component.get("time"), 9)] = update.states_changed
+        assert update.states_changed == (component.vector("GetContinuousStates", 2)[1] != before)
+    # The switch of 0.3 and 0.6 s changes the speed of the flow, the timer of 0.45 s a state.
+    assert told == {0.3: False, 0.45: True, 0.6: False}
+    component.free()
+
+
+@VERSIONS
 def test_breakpoints_of_the_flow_are_announced_too(fmi, make):
     """An integrator must not step over the kinks of a flow, although no variable shows them."""
     component = make("mix", fmi)
