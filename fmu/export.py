@@ -17,6 +17,9 @@ from fmu.network import NetworkTrace, trace_any
 from fmu.package import check_target
 from fmu.variables import Fmi, fmu_variables
 from hybrid_model import Automaton
+from hybrid_model.arguments import require_automaton
+from hybrid_model.calls import explained
+from hybrid_model.real_numbers import is_real
 
 KINDS = ("cs", "me")
 """Co-Simulation and Model Exchange."""
@@ -25,6 +28,7 @@ _TOKEN = "place-of-the-instantiation-token"
 """Stands for the token until what it is a digest of has been written; of the same length."""
 
 
+@explained(ExportError)
 def export_fmu(
     automaton: Automaton,
     path: str | Path,
@@ -76,6 +80,10 @@ def export_fmu(
     fmu.build.BuildError
         If there is no C compiler, the code does not compile, or the file cannot be written.
     """
+    require_automaton("export_fmu", automaton)
+    if not isinstance(path, (str, Path)):
+        suggested = f"{model_identifier(automaton.name)}.fmu"
+        raise ExportError(f"The path {path!r} is no name of a file: give one, such as {suggested!r}.")
     version, target = _version(fmi), Path(path)
     _check_experiment(stop_time, step_size)
     chosen = _kinds(kinds)
@@ -119,8 +127,8 @@ def export_fmu(
 
 def _check_experiment(stop_time: float | None, step_size: float | None) -> None:
     for name, value in (("stop time", stop_time), ("step size", step_size)):
-        if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise ExportError(f"The {name} {value} s cannot be proposed: give a finite number above zero, or none.")
+        if value is not None and not (is_real(value) and math.isfinite(value) and value > 0.0):
+            raise ExportError(f"The {name} {value!r} s cannot be proposed: give a finite number above zero, or none.")
 
 
 def _headers() -> list[Path]:

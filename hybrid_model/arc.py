@@ -14,6 +14,7 @@ from hybrid_model.arc_values import ArcValues, ComputedValues
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DataError, DeclarationError
 from hybrid_model.flow_record import FlowRecord as FlowRecord
+from hybrid_model.real_numbers import real_array, told
 from hybrid_model.samples import Samples
 from hybrid_model.stop import Stop
 from hybrid_model.variables import FloatArray, Kind, Values, Variable, unknown_name
@@ -108,6 +109,12 @@ class HybridArc:
             f"{self.stop.name})"
         )
 
+    def __getattr__(self, name: str) -> Any:
+        automaton = vars(self).get("automaton")
+        if automaton is not None and any(name == variable.name for variable in automaton.variables):
+            raise DeclarationError(f"a run has no attribute {name!r}: write arc[{name!r}] for the samples of {name}.")
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+
     def __getitem__(self, name: str) -> FloatArray:
         """Return a variable's samples, shape (n, *shape): a state, input, parameter or output."""
         shape = self._read.variable(name).shape
@@ -150,7 +157,7 @@ class HybridArc:
             For an unknown name or a hybrid time outside the run.
         """
         shape = self.variable(name).shape
-        times = np.asarray(t, dtype=np.float64)
+        times = _times(t)
         if j is None:
             self._require_inside(times)
             flows = [self._flow_at(float(time), before) for time in times.ravel()]
@@ -232,7 +239,7 @@ class HybridArc:
         DeclarationError
             For an unknown name or a time outside the run.
         """
-        times = np.atleast_1d(np.asarray(grid, dtype=np.float64))
+        times = np.atleast_1d(_times(grid))
         self._require_inside(times)
         after = np.searchsorted(self._starts, times, side="right") - 1
         if both_sides:
@@ -392,11 +399,23 @@ class HybridArc:
         return self._flows[int(number)]
 
 
+def _times(given: npt.ArrayLike) -> FloatArray:
+    try:
+        return real_array(given)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DeclarationError(f"the times are {told(given)}: give numbers in s.") from error
+
+
 def _interval(what: str, given: Interval | None) -> Interval:
     if given is None:
         return -np.inf, np.inf
-    a, b = given
+    try:
+        a, b = (float(end) for end in given)
+    except (TypeError, ValueError) as error:
+        raise DeclarationError(
+            f"the interval {what} = {told(given)} has no two ends: write {what}=(first, last)."
+        ) from error
     # Written so that an end that is not a number is refused as well.
     if not a <= b:
-        raise DeclarationError(f"the interval {what} = ({a}, {b}) is empty: give its start first.")
+        raise DeclarationError(f"the interval {what} = ({given[0]}, {given[1]}) is empty: give its start first.")
     return a, b

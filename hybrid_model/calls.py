@@ -18,11 +18,15 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def explained(**options: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def explained(
+    error_class: type[Exception] = SimulationError, /, **options: type
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Return a decorator of a function that runs an automaton: it says what to write in the place of unknown arguments.
 
     Parameters
     ----------
+    error_class : type
+        What is raised.
     **options : type
         Argument -> class of what it takes; the fields of that class are often given to the function itself.
     """
@@ -35,7 +39,7 @@ def explained(**options: type) -> Callable[[Callable[P, R]], Callable[P, R]]:
             try:
                 signature.bind(*given, **named)
             except TypeError as error:
-                raise SimulationError(_sentence(function.__name__, signature, options, given, named)) from error
+                raise error_class(_sentence(function.__name__, signature, options, given, named)) from error
             return function(*given, **named)
 
         return call

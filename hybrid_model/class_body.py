@@ -14,7 +14,7 @@ from weakref import WeakSet
 from hybrid_model.errors import DeclarationError
 from hybrid_model.real_numbers import told
 from hybrid_model.signatures import require_map
-from hybrid_model.transitions import Clock
+from hybrid_model.transitions import Clock, Priority
 from hybrid_model.variables import Declaration, Dimension, Kind
 
 MAPS = ("flow_map", "flow_set", "start_map", "outputs", "jump_set", "jump_map")
@@ -56,6 +56,7 @@ def require_sound_body(cls: type, listed: Mapping[str, tuple[type, ...]]) -> Non
         for name, value in _attributes(body):
             _refuse_hiding(cls, body, name, value)
             _refuse_framework_name(cls, framework, name)
+            _refuse_wrong_value(cls, name, value)
             _refuse_misspelt(cls, name, value)
             if name in MAPS:
                 _require_arguments(cls, name, value)
@@ -98,6 +99,17 @@ def _refuse_framework_name(cls: type, framework: type, name: str) -> None:
         raise DeclarationError(
             f"{cls.__name__} defines {name!r}, a name of the framework: choose another. Yours to write are "
             f"{', '.join(sorted({*own, *UNBOUND}))}."
+        )
+
+
+def _refuse_wrong_value(cls: type, name: str, value: object) -> None:
+    if isinstance(value, type) and issubclass(value, DECLARED):
+        raise DeclarationError(
+            f"{cls.__name__}.{name} is the class {value.__name__}: write {name} = hm.{value.__name__}(...)."
+        )
+    if name == "priority" and not isinstance(value, Priority):
+        raise DeclarationError(
+            f"{cls.__name__}.priority is {told(value)}: write hm.Priority.JUMP (the default) or hm.Priority.FLOW."
         )
 
 

@@ -6,6 +6,7 @@ from functools import reduce
 
 import numpy as np
 
+from hybrid_model.errors import DeclarationError
 from hybrid_model.variables import Value
 
 
@@ -17,7 +18,7 @@ def least(*margins: Value) -> Value:
     *margins : float, array or symbol
         Margins of the sets; for arrays elementwise.
     """
-    return reduce(np.minimum, margins)
+    return reduce(np.minimum, _some(margins))
 
 
 def greatest(*margins: Value) -> Value:
@@ -28,4 +29,12 @@ def greatest(*margins: Value) -> Value:
     *margins : float, array or symbol
         Margins of the sets; for arrays elementwise.
     """
-    return reduce(np.maximum, margins)
+    return reduce(np.maximum, _some(margins))
+
+
+def _some(margins: tuple[Value, ...]) -> tuple[Value, ...]:
+    if not margins:
+        raise DeclarationError(
+            "no margin is given to least or greatest: write least(first, second), or *margins for a list."
+        )
+    return margins

@@ -18,12 +18,13 @@ from hybrid_model.automaton import HybridAutomaton
 from hybrid_model.class_body import require_sound_body
 from hybrid_model.errors import DeclarationError, SimulationError
 from hybrid_model.margins import least
+from hybrid_model.signatures import ExplainedCall
 from hybrid_model.transitions import Assignments, Jump, TimeEvent, require_maps
 from hybrid_model.variables import DiscreteState, Value, Values
 
 
 @dataclass(frozen=True)
-class Mode:
+class Mode(ExplainedCall):
     """A mode (location) of a classical hybrid automaton.
 
     Attributes
@@ -45,7 +46,7 @@ class Mode:
 
 
 @dataclass(frozen=True)
-class Switch:
+class Switch(ExplainedCall):
     """A jump from one mode to another, or to the same one.
 
     Attributes
@@ -71,7 +72,7 @@ class Switch:
 
 
 @dataclass(frozen=True)
-class TimedSwitch:
+class TimedSwitch(ExplainedCall):
     """A switch at a known time.
 
     Attributes

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from hybrid_model.csv_table import read_table
 from hybrid_model.errors import DataError
+from hybrid_model.real_numbers import real_array, told
 from hybrid_model.variables import FloatArray
 
 ELEMENT = re.compile(r"(?P<name>.+)\[(?P<index>\d+(,\d+)*)\]")
@@ -42,6 +43,8 @@ class Samples:
     values: Mapping[str, FloatArray]
 
     def __post_init__(self) -> None:
+        if not isinstance(self.values, Mapping):
+            raise DataError(f"the values are {told(self.values)}: give a mapping, {{'variable': its values}}.")
         t, j = _numbers("t", self.t), _numbers("j", self.j)
         if t.ndim != 1 or j.shape != t.shape:
             raise DataError(f"t has shape {t.shape} and j shape {j.shape}: give two arrays of one length.")
@@ -154,8 +157,8 @@ def _jumps(t: FloatArray, columns: Mapping[str, FloatArray]) -> npt.NDArray[np.i
 
 def _numbers(name: str, given: npt.ArrayLike | Sequence[str]) -> FloatArray:
     try:
-        return np.array(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+        return real_array(given)
+    except (TypeError, ValueError, OverflowError) as error:
         raise DataError(f"{name} does not hold numbers only: {error}.") from error
 
 

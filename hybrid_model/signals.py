@@ -13,13 +13,13 @@ import numpy.typing as npt
 from hybrid_model.errors import DeclarationError, SimulationError
 from hybrid_model.layout import Layout, Place
 from hybrid_model.real_numbers import real_array, told
-from hybrid_model.signatures import require_map
+from hybrid_model.signatures import ExplainedCall, require_map
 from hybrid_model.tuning import Steps, tuned_value
 from hybrid_model.variables import FloatArray, Kind, Variable, start_array, unknown_name
 
 
 @dataclass(frozen=True)
-class Signal:
+class Signal(ExplainedCall):
     """A function of time that jumps at known times, or does something short there.
 
     A run sees a plain function of time only at the points that its solver chooses, and steps over a pulse between two

@@ -6,6 +6,7 @@ import difflib
 import inspect
 from collections.abc import Mapping, Sequence
 from types import FunctionType
+from typing import Any, Self
 
 from hybrid_model.errors import DeclarationError
 
@@ -85,7 +86,18 @@ def require_call(called: str, cls: type, given: Sequence[object], options: Mappi
     needed = len(positional) - len(constructors[0].__defaults__ or ())
     missing = [name for name in positional[len(given) : needed] if name not in options]
     if missing:
-        raise DeclarationError(f"{called} needs a value: write {called}(value), by name {', '.join(missing)}=value.")
+        raise DeclarationError(f"{called} needs {' and '.join(missing)}: write {called}({', '.join(positional)}).")
+
+
+class ExplainedCall:
+    """Base of classes whose constructor says what it takes where it is called with something else."""
+
+    __slots__ = ()
+
+    def __new__(cls, *given: Any, **options: Any) -> Self:
+        """Look at the arguments before the constructor does."""
+        require_call(f"hm.{cls.__name__}", cls, given, options)
+        return super().__new__(cls)
 
 
 def meant(name: str, known: Sequence[str]) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybrid_model.errors import DeclarationError
-from hybrid_model.signatures import require_map
+from hybrid_model.signatures import ExplainedCall, require_map
 from hybrid_model.variables import Value, Values
 
 Assignments = Mapping[str, Value]
@@ -49,7 +49,7 @@ class JumpInfo:
 
 
 @dataclass(frozen=True)
-class Jump:
+class Jump(ExplainedCall):
     """A jump on a state margin, for automata with several: jump set (margin) and jump map by name.
 
     Attributes
@@ -71,7 +71,7 @@ class Jump:
 
 
 @dataclass(frozen=True)
-class TimeEvent:
+class TimeEvent(ExplainedCall):
     """A jump at a known time.
 
     Attributes
@@ -119,7 +119,7 @@ def require_maps(transition: Any, *maps: str) -> None:
         require_map(f"{name} of {kind} {transition.name!r}", getattr(transition, name))
 
 
-class Clock:
+class Clock(ExplainedCall):
     """An output that ticks with a jump, and holds no value.
 
     Parameters

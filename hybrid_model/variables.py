@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from hybrid_model.errors import DeclarationError
 from hybrid_model.real_numbers import real_array, told
-from hybrid_model.signatures import require_call
+from hybrid_model.signatures import ExplainedCall
 
 FloatArray = npt.NDArray[np.float64]
 Value = Any
@@ -151,7 +151,7 @@ class Dimension(ClassAttribute):
         return "dimensions"
 
 
-class Declaration(ClassAttribute):
+class Declaration(ExplainedCall, ClassAttribute):
     """A variable as the author of an automaton writes it: a class attribute without a name yet.
 
     Parameters
@@ -170,11 +170,6 @@ class Declaration(ClassAttribute):
 
     kind: Kind
 
-    def __new__(cls, *given: Any, **options: Any) -> Self:
-        """Say which options there are where one is unknown."""
-        require_call(f"hm.{cls.__name__}", cls, given, options)
-        return super().__new__(cls)
-
     def __init__(
         self,
         start: npt.ArrayLike = 0.0,
@@ -191,6 +186,14 @@ class Declaration(ClassAttribute):
         self.minimum, self.maximum, self.nominal = minimum, maximum, nominal
         self.unit = unit
         self.description = description
+        for option, text in (("unit", unit), ("description", description)):
+            if not isinstance(text, str):
+                raise DeclarationError(f"{option} = {told(text)} is no text: write {option}={str(text)!r}.")
+        for option, said in traits.items():
+            if not isinstance(said, bool):
+                raise DeclarationError(
+                    f"{option} = {told(said)} is not yes or no: write {option}=True or {option}=False."
+                )
         lengths = shape if isinstance(shape, tuple) else (shape,)
         self.shape = tuple(name for name in lengths if isinstance(name, str))
         self.traits = traits

@@ -9,6 +9,7 @@ it checks a hand-written loop, another tool, or measured data. See `hybrid_model
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,10 @@ def _samples(data: Any) -> Samples:
         return data
     if hasattr(data, "columns") and hasattr(data, "reset_index"):
         return Samples.from_dataframe(data)
+    if isinstance(data, (str, Path)):
+        raise DataError(
+            f"{data} is the name of a file: write hm.Samples.from_csv({str(data)!r}), or hm.load_arc for .npz."
+        )
     raise DataError(f"a {type(data).__name__} holds no samples of a run: give a HybridArc, Samples or a DataFrame.")
 
 

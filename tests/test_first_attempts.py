@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
+from fmu.errors import ExportError
+from fmu.export import export_fmu
 from fmu.trace import trace
 from hybrid_model.models import BouncingBall, RestingBall
 
@@ -121,7 +123,7 @@ def test_declared_outputs_and_computed_starts_need_their_map():
         (lambda: hm.State(1.0, integer=True), r"^hm\.State has no option 'integer'; it has start, output, computed"),
         (lambda: hm.Output(0.0), r"^hm\.Output takes 0 values by position, but \(0\.0,\) was given: name the others"),
         (lambda: hm.State(1.0, "m"), r"^hm\.State takes 1 value by position, but \(1\.0, 'm'\) was given"),
-        (lambda: hm.Parameter(), r"^hm\.Parameter needs a value: write hm\.Parameter\(value\)"),
+        (lambda: hm.Parameter(), r"^hm\.Parameter needs start: write hm\.Parameter\(start\)"),
         (lambda: hm.State([1.0, 2.0], shape=3), r"^shape = \(3,\) does not fit the start value \[1\.0, 2\.0\]"),
         (lambda: hm.State(0.0, shape=2.5), r"^shape = \(2\.5,\) does not fit"),
         (lambda: hm.State(0.0, shape=("n", 2)), r"^shape = \('n', 2\) mixes names and lengths"),
@@ -367,3 +369,100 @@ def test_automata_and_their_arcs_can_be_pickled_and_copied(make, again):
     repeated = run(again(make()), 1.2)
     assert repr(repeated.end) == repr(arc.end)
     assert [jump.t for jump in repeated.jumps] == [jump.t for jump in arc.jumps]
+
+
+# Other slips of a first day.
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ({"w": hm.State}, r"^Wrong\.w is the class State: write w = hm\.State\(\.\.\.\)\.$"),
+        (
+            {"priority": "flow"},
+            r"^Wrong\.priority is 'flow': write hm\.Priority\.JUMP \(the default\) or hm\.Priority\.FLOW",
+        ),
+    ],
+)
+def test_what_would_be_ignored_in_a_class(body, sentence):
+    with pytest.raises(hm.DeclarationError, match=sentence):
+        ball_with(**body)()
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: hm.State(0.0, unit=5), r"^unit = 5 is no text: write unit='5'\.$"),
+        (lambda: hm.State(0.0, description=None), r"^description = None is no text"),
+        (lambda: hm.State(0.0, output="yes"), r"^output = 'yes' is not yes or no: write output=True or output=False"),
+        (lambda: hm.Clock(), r"^hm\.Clock needs jump: write hm\.Clock\(jump, description\)\.$"),
+        (lambda: hm.Jump("up", len), r"^hm\.Jump needs jump_map: write hm\.Jump\(name, jump_set, jump_map\)\.$"),
+        (
+            lambda: hm.Jump("up", guard=1, reset=2),
+            r"^hm\.Jump has no option 'guard'; it has name, jump_set, jump_map\.$",
+        ),
+        (lambda: hm.Mode("on", flow=len), r"^hm\.Mode has no option 'flow': write 'flow_map'\.$"),
+        (
+            lambda: hm.Switch("go", "on", "off"),
+            r"^hm\.Switch needs guard: write hm\.Switch\(name, source, target, guard, ",
+        ),
+        (lambda: hm.Signal(len, breakpoint=[1.0]), r"^hm\.Signal has no option 'breakpoint': write 'breakpoints'\.$"),
+        (lambda: hm.least(), r"^no margin is given to least or greatest: write least\(first, second\)"),
+        (lambda: hm.Samples([0.0], [0], [1.0]), r"^the values are \[1\.0\]: give a mapping, {'variable': its values}"),
+        (lambda: hm.Samples([0.0], [0], {"h": [None]}), r"^h does not hold numbers only"),
+        (
+            lambda: hm.verify(BouncingBall(), "run.csv"),
+            r"^run\.csv is the name of a file: write hm\.Samples\.from_csv\('run",
+        ),
+    ],
+)
+def test_constructors_and_functions_given_something_else(make, sentence):
+    with pytest.raises(hm.HybridModelError, match=sentence):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("use", "sentence"),
+    [
+        (lambda arc: arc.h, r"^a run has no attribute 'h': write arc\['h'\] for the samples of h\.$"),
+        (lambda arc: arc.at("h", "soon"), r"^the times are 'soon': give numbers in s\.$"),
+        (lambda arc: arc.resample(None), r"^the times are None: give numbers in s\.$"),
+        (lambda arc: arc.restrict(t=1.0), r"^the interval t = 1\.0 has no two ends: write t=\(first, last\)\.$"),
+        (lambda arc: arc.restrict(j=(1, 2, 3)), r"^the interval j = \(1, 2, 3\) has no two ends"),
+    ],
+)
+def test_a_run_asked_for_something_else(use, sentence):
+    with pytest.raises(hm.DeclarationError, match=sentence):
+        use(run(BouncingBall()))
+
+
+def test_other_attributes_of_a_run_are_missing_as_python_says():
+    arc = run(BouncingBall())
+    assert not hasattr(arc, "colour")
+    with pytest.raises(AttributeError, match=r"^'HybridArc' object has no attribute 'colour'$"):
+        _ = arc.colour
+
+
+@pytest.mark.parametrize(
+    ("given", "named", "sentence"),
+    [
+        ((BouncingBall, "ball.fmu"), {}, r"^export_fmu was given the class BouncingBall, but takes an instance"),
+        (("ball.fmu", BouncingBall()), {}, r"^export_fmu was given 'ball\.fmu', but takes an automaton"),
+        ((BouncingBall(), None), {}, r"^The path None is no name of a file: give one, such as 'BouncingBall\.fmu'\.$"),
+        (
+            (BouncingBall(), "ball.fmu"),
+            {"version": "3.0"},
+            r"^export_fmu has no option 'version'; it has fmi, kinds, plat",
+        ),
+        (
+            (BouncingBall(), "ball.fmu"),
+            {"stop_time": "2"},
+            r"^The stop time '2' s cannot be proposed: give a finite number",
+        ),
+        ((BouncingBall(), "ball.fmu"), {"fmi": 3.0}, r"^FMI version 3\.0 is not one that can be exported"),
+        ((BouncingBall(),), {}, r"^export_fmu needs path: write export_fmu\(automaton, path\)\.$"),
+    ],
+)
+def test_an_export_of_something_else(given, named, sentence):
+    with pytest.raises((hm.DeclarationError, ExportError), match=sentence):
+        export_fmu(*given, **named)
