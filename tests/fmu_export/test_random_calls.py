@@ -525,7 +525,7 @@ def run(label, binaries, examples, steps, **options):
 
 @pytest.mark.parametrize("label", LABELS)
 def test_random_calls(label, binaries):
-    run(label, binaries, 16, 25, derandomize=True)
+    run(label, binaries, 16, 25)
 
 
 @pytest.mark.long

@@ -148,7 +148,7 @@ def test_every_model_in_every_way(name, library, references):
 UNIT = st.floats(0.0, 1.0)
 
 
-@settings(max_examples=25, deadline=None, phases=[Phase.explicit, Phase.generate], derandomize=True)
+@settings(max_examples=25, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(data=st.data())
 def test_random_automata_in_every_way(data, library):
     draw = lambda low, high: low + (high - low) * data.draw(UNIT)  # noqa: E731

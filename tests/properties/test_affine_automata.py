@@ -39,9 +39,6 @@ def check(family, examples):
     @settings(
         max_examples=examples,
         phases=[Phase.generate],
-        deadline=None,
-        derandomize=True,
-        database=None,
         suppress_health_check=list(HealthCheck),
     )
     @given(strategy(), st.sampled_from(SOLVERS))
