@@ -12,19 +12,20 @@ from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2LastSuccessfulTime, fmi2Termin
 from cosim.fmu_instance import Advance, FmuInstance, Getter
 from fmu.importer.callbacks import Callbacks
 from fmu.importer.loading import load_binary
+from fmu.importer.values import access
 
 
 class Fmi2Instance(FmuInstance):
     """An instance of an FMU of FMI 2.0; see `FmuInstance`."""
 
     def _load(self, description: Any, folder: Path, **arguments: Any) -> Any:
-        return load_binary(FMU2Slave, folder, guid=description.guid, **arguments)
+        return load_binary(FMU2Slave, folder, 2, guid=description.guid, **arguments)
 
     def instantiate(self, events: bool) -> None:
         """See `FmuInstance.instantiate`."""
         if events:
             raise self._no_events()
-        self._callbacks = Callbacks(self.log)
+        self._callbacks = Callbacks(self.log, self.name)
         try:
             self.fmu.instantiate(callbacks=self._callbacks.functions)
         except Exception:
@@ -38,11 +39,11 @@ class Fmi2Instance(FmuInstance):
 
     def getter(self, variable: Any, size: int) -> Getter:
         """See `FmuInstance.getter`."""
-        return getattr(self.fmu, f"get{_access(variable)}"), ([variable.valueReference],)
+        return getattr(self.fmu, f"get{access(variable, fmi2=True)}"), ([variable.valueReference],)
 
     def set(self, variable: Any, values: Sequence[Any]) -> None:
         """See `FmuInstance.set`."""
-        getattr(self.fmu, f"set{_access(variable)}")([variable.valueReference], values)
+        getattr(self.fmu, f"set{access(variable, fmi2=True)}")([variable.valueReference], values)
 
     def step(self, t: float, size: float) -> Advance:
         """See `FmuInstance.step`."""
@@ -71,7 +72,3 @@ class Fmi2Instance(FmuInstance):
         """See `FmuInstance.free`."""
         self.fmu.fmi2FreeInstance(self.fmu.component)
         self._callbacks.release()
-
-
-def _access(variable: Any) -> str:
-    return "Integer" if variable.type == "Enumeration" else str(variable.type)

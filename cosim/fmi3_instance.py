@@ -10,13 +10,14 @@ from fmpy.fmi3 import FMU3Slave
 
 from cosim.fmu_instance import Advance, FmuInstance, Getter
 from fmu.importer.loading import load_binary
+from fmu.importer.values import access
 
 
 class Fmi3Instance(FmuInstance):
     """An instance of an FMU of FMI 3.0; see `FmuInstance`."""
 
     def _load(self, description: Any, folder: Path, **arguments: Any) -> Any:
-        return load_binary(FMU3Slave, folder, guid=description.instantiationToken, **arguments)
+        return load_binary(FMU3Slave, folder, 3, guid=description.instantiationToken, **arguments)
 
     def instantiate(self, events: bool) -> None:
         """See `FmuInstance.instantiate`."""
@@ -32,11 +33,11 @@ class Fmi3Instance(FmuInstance):
 
     def getter(self, variable: Any, size: int) -> Getter:
         """See `FmuInstance.getter`."""
-        return getattr(self.fmu, f"get{_access(variable)}"), ([variable.valueReference], size)
+        return getattr(self.fmu, f"get{access(variable, fmi2=False)}"), ([variable.valueReference], size)
 
     def set(self, variable: Any, values: Sequence[Any]) -> None:
         """See `FmuInstance.set`."""
-        getattr(self.fmu, f"set{_access(variable)}")([variable.valueReference], values)
+        getattr(self.fmu, f"set{access(variable, fmi2=False)}")([variable.valueReference], values)
 
     def step(self, t: float, size: float) -> Advance:
         """See `FmuInstance.step`."""
@@ -83,10 +84,6 @@ class Fmi3Instance(FmuInstance):
     def enter_step_mode(self) -> None:
         """See `FmuInstance.enter_step_mode`."""
         self.fmu.enterStepMode()
-
-
-def _access(variable: Any) -> str:
-    return "Int64" if variable.type == "Enumeration" else str(variable.type)
 
 
 def _text(message: bytes | None) -> str:

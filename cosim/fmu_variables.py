@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.fmu_values import DISCRETE, TYPES
 from cosim.slave import Port
+from fmu.importer.values import DISCRETE, INTEGERS, TYPES
 
 KINDS = {"String": "text", "Binary": "bytes"}
 """What ports of these types carry; those of all others carry numbers."""
@@ -31,7 +31,11 @@ class FmuVariables:
     def __init__(self, description: Any) -> None:
         self._variables = [variable for variable in description.modelVariables if variable.type in TYPES]
         # Arrays have the sizes that structural parameters say.
-        self._sizes = {v.valueReference: int(v.start) for v in self._variables if v.causality == STRUCTURAL and v.start}
+        self._sizes = {
+            v.valueReference: int(v.start)
+            for v in self._variables
+            if v.causality == STRUCTURAL and v.type in INTEGERS and v.start
+        }
         self._count()
 
     def resize(self, parameter: Any, value: int) -> None:

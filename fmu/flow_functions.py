@@ -26,6 +26,7 @@ from fmu.importer.callbacks import Callbacks
 from fmu.importer.folders import temporary_folder
 from fmu.importer.loading import load_binary, read_description
 from fmu.importer.unpacking import unpack
+from fmu.importer.values import access, exact
 
 FloatArray = npt.NDArray[np.float64]
 MAX_ITERATIONS = 1000
@@ -148,6 +149,7 @@ class FlowFunctions:
         self._fmu = load_binary(
             FMU2Model if self._fmi2 else FMU3Model,
             folder,
+            2 if self._fmi2 else 3,
             guid=token,
             modelIdentifier=interface.modelIdentifier,
             instanceName=self.name,
@@ -167,7 +169,7 @@ class FlowFunctions:
         if not self._fmi2:
             self._fmu.instantiate(logMessage=lambda environment, status, category, message: None)
             return None
-        callbacks = Callbacks(lambda status, message: None)
+        callbacks = Callbacks(lambda status, message: None, self.name)
         try:
             self._fmu.instantiate(callbacks=callbacks.functions)
         except Exception:
@@ -223,9 +225,8 @@ class FlowFunctions:
         return np.array(values, dtype=np.float64)
 
     def _set(self, variable: Any, values: list[float]) -> None:
-        whole = variable.type not in ("Real", "Float32", "Float64")
-        numbers = [round(value) if whole else float(value) for value in values]
-        getattr(self._fmu, f"set{variable.type}")([variable.valueReference], numbers)
+        numbers = [exact(variable, value, str(variable.name)) for value in values]
+        getattr(self._fmu, f"set{access(variable, fmi2=self._fmi2)}")([variable.valueReference], numbers)
 
     def _sensitivity(self, unknowns: list[Any], known: Any, place: int) -> list[float]:
         references = [variable.valueReference for variable in unknowns]

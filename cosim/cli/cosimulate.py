@@ -13,13 +13,13 @@ from cosim.cli.exits import UsageError, exit_of, given_values, progress, write_c
 from cosim.consensus import fmu_system
 from cosim.errors import MisfitError
 from cosim.fmu_slave import FmuSlave
-from cosim.fmu_values import shown
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
 from fmu.export import export_fmu
 from fmu.importer.folders import temporary_folder
+from fmu.importer.values import shown
 from hybrid_model.consensus.network import scenario_agents
 from hybrid_model.consensus.scenario import load_scenario
 from hybrid_model.consensus.scenario_data import Scenario
@@ -28,7 +28,7 @@ MOST_SHOWN = 8
 """Most times of events of one slave that are printed."""
 STEP, OUTPUT_INTERVAL = 0.01, 0.1
 """In s: the communication step and the spacing of the output where nobody proposes one, if they fit into the run."""
-FEWEST = 10
+FEWEST, MOST = 10, 100_000
 """Steps of a run where nobody proposes their length."""
 EVENT_EXACT, FIXED_STEP = "event-exact", "fixed-step"
 
@@ -155,7 +155,7 @@ def _part(length: float, wanted: float) -> float:
     """Return a part of a run that divides it, about as long as wanted."""
     if not (math.isfinite(length) and length > 0.0):
         return wanted  # the master says what is wrong
-    return length / max(math.ceil(length / wanted * (1.0 - 1e-12)), FEWEST)
+    return length / min(max(math.ceil(length / wanted * (1.0 - 1e-12)), FEWEST), MOST)
 
 
 def _events(slave: str, result: CosimResult) -> str:
@@ -166,7 +166,7 @@ def _events(slave: str, result: CosimResult) -> str:
 
 
 def _text(result: CosimResult) -> str:
-    lines = [result.message or f"reached t = {result.t:.9g} s in {result.steps} steps"]
+    lines = [result.message or f"reached t = {result.t:.9g} s in {result.steps} step{'s' * (result.steps != 1)}"]
     clocks = sorted({(tick.slave, tick.clock) for tick in result.ticks})
     told = {slave for slave, _ in clocks}
     lines += [_events(name, result) for name in sorted({event.block for event in result.events} - told)]

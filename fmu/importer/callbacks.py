@@ -23,6 +23,7 @@ from fmu.importer.memory import memory_functions
 
 Listener = Callable[[int, str], None]
 _listeners: dict[int, Listener] = {}
+_named: dict[bytes, Listener] = {}
 _environments = itertools.count(1)
 
 
@@ -33,6 +34,8 @@ class Callbacks:
     ----------
     listener : callable
         Told the status and the text of each message.
+    name : str
+        Of the instance: some FMUs name it in their messages, but not the environment.
 
     Attributes
     ----------
@@ -40,9 +43,10 @@ class Callbacks:
         For fmpy's ``instantiate``.
     """
 
-    def __init__(self, listener: Listener) -> None:
-        self._environment = next(_environments)
+    def __init__(self, listener: Listener, name: str) -> None:
+        self._environment, self._name = next(_environments), name.encode()
         _listeners[self._environment] = listener
+        _named[self._name] = listener
         allocate, free = memory_functions()
         self.functions = fmi2CallbackFunctions(
             logger=_logger,
@@ -58,10 +62,11 @@ class Callbacks:
     def release(self) -> None:
         """Forget the listener; the instance is gone."""
         _listeners.pop(self._environment, None)
+        _named.pop(self._name, None)
 
 
 def _log(environment: int | None, name: bytes, status: int, category: bytes, message: bytes) -> None:
-    listener = _listeners.get(environment or 0)
+    listener = _listeners.get(environment or 0) or _named.get(name or b"")
     if listener is None:  # of somebody else's instance, made by fmpy
         printLogMessage(environment, name, status, category, message)
     else:

@@ -8,11 +8,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fmpy import read_model_description
+from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
 from fmu.check.archive import Archive
 
 Fmu = TypeVar("Fmu")
+
+
+class LoadError(ValueError):
+    """An FMU cannot be loaded on this machine."""
 
 
 def read_description(path: str | Path, *, validate: bool = True) -> Any:
@@ -35,7 +39,7 @@ def read_description(path: str | Path, *, validate: bool = True) -> Any:
         return read_model_description(str(path), validate=validate)
 
 
-def load_binary(make: Callable[..., Fmu], folder: Path, **arguments: Any) -> Fmu:
+def load_binary(make: Callable[..., Fmu], folder: Path, major: int, **arguments: Any) -> Fmu:
     """Return an object of fmpy with the FMU's binary loaded.
 
     Parameters
@@ -44,17 +48,32 @@ def load_binary(make: Callable[..., Fmu], folder: Path, **arguments: Any) -> Fmu
         ``FMU2Slave``, ``FMU2Model``, ``FMU3Slave`` or ``FMU3Model`` of fmpy.
     folder : Path
         The FMU, unpacked.
+    major : int
+        Version of the standard.
     **arguments
         ``guid``, ``modelIdentifier`` and ``instanceName``.
 
     Raises
     ------
+    LoadError
+        If there is no binary for this machine.
     Exception
-        Of fmpy, if there is no binary for this machine or it cannot be loaded.
+        Of fmpy, if it cannot be loaded.
     """
+    _require_binary(folder, major == 3, arguments["modelIdentifier"])
     # fmpy goes to the binary's folder to load it, and stays there if that fails.
     with _working_folder_kept():
         return make(unzipDirectory=str(folder), **arguments)
+
+
+def _require_binary(folder: Path, fmi3: bool, identifier: str) -> None:
+    wanted, places = platform_tuple if fmi3 else platform, folder / "binaries"
+    if not (places / wanted / f"{identifier}{sharedLibraryExtension}").is_file():
+        others = sorted(place.name for place in places.iterdir()) if places.is_dir() else []
+        raise LoadError(
+            f"there is no binaries/{wanted}/{identifier}{sharedLibraryExtension} in it; it has binaries for "
+            f"{', '.join(others) or 'no platform'}"
+        )
 
 
 @contextlib.contextmanager

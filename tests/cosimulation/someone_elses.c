@@ -6,7 +6,7 @@
 
 #include "fmi2Functions.h"
 
-enum { WELL, STUCK, ENDS, FAILS, CRAWLS, DIES };
+enum { WELL, STUCK, ENDS, FAILS, CRAWLS, DIES, BREAKS };
 
 typedef struct {
     const fmi2CallbackFunctions *functions;
@@ -106,6 +106,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real point, fmi2Real size, fmi2Boolea
         say(block, fmi2Error, "no solution at %g", point);
         return fmi2Error;
     }
+    if (block->behaviour == BREAKS)
+        return fmi2Fatal;
     if (block->behaviour == DIES)
         _Exit(7);
     if (block->behaviour == STUCK)

@@ -1,11 +1,13 @@
 """FMUs of both versions as slaves, ours and somebody else's."""
 
+import gc
 import math
 import os
 import subprocess
 import sys
 import time
 import zipfile
+from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -49,7 +51,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
   <ModelStructure><Outputs><Unknown index="1"/><Unknown index="5"/></Outputs></ModelStructure>
 </fmiModelDescription>
 """
-STUCK, ENDS, FAILS, CRAWLS, DIES = 1, 2, 3, 4, 5
+STUCK, ENDS, FAILS, CRAWLS, DIES, BREAKS = 1, 2, 3, 4, 5, 6
 
 
 @pytest.fixture
@@ -243,6 +245,16 @@ def test_steps_that_lead_nowhere_are_errors(behaviour, sentence, other):
         run(slave)
 
 
+def test_nothing_is_called_after_a_fatal_answer(other):
+    slave = FmuSlave("other", other())
+    slave.set("behaviour", BREAKS)
+    freed, free = [], slave.load().free
+    slave.load().free = lambda: freed.append(free())
+    with pytest.raises(CosimError, match="other: fmi2DoStep failed"):
+        run(slave)
+    assert freed == []
+
+
 def test_an_fmu_that_refuses_to_be_instantiated_is_quoted(other):
     slave = FmuSlave("other", other(guid="nobody"))
     with pytest.raises(CosimError, match="other refuses to be instantiated: this is no block number 7"):
@@ -264,8 +276,18 @@ def test_files_that_are_no_cosimulation_fmu_are_refused(given, sentence, other):
 
 def test_an_fmu_for_another_machine_is_refused_when_it_is_loaded(other):
     slave = FmuSlave("other", other(member="binaries/win64/other.dll"))
-    with pytest.raises(CosimError, match=r"other: .* cannot be loaded on this machine"):
+    with pytest.raises(CosimError, match=r"there is no binaries/linux64/other\.so in it; it has binaries for win64"):
         run(slave)
+
+
+def test_a_slave_that_is_gone_leaves_nothing(other):
+    slave = FmuSlave("other", other())
+    run(slave)
+    folder = Path(slave.load().fmu.unzipDirectory)
+    assert folder.is_dir()
+    del slave
+    gc.collect()
+    assert not folder.exists()
 
 
 def test_a_binary_that_cannot_be_loaded_leaves_this_process_where_it_is(tmp_path):

@@ -7,9 +7,8 @@ import math
 import operator
 from typing import Any
 
-from cosim.errors import MisfitError
-from cosim.slave import Value
-
+Value = float | str | bytes
+"""What a variable holds: a number, an int or bool exactly as such, a text, or bytes."""
 FLOATS = {"Real": 1.7976931348623157e308, "Float64": 1.7976931348623157e308, "Float32": 3.4028234663852886e38}
 """Types that hold numbers with a fraction, and the largest number of each."""
 BITS = {"Integer": 32, **{f"Int{bits}": bits for bits in (8, 16, 32, 64)}}
@@ -25,6 +24,10 @@ _DIGITS = 400
 """Longest number that is read digit by digit; none that fits any type is longer."""
 
 
+class UnfitError(ValueError):
+    """A variable of an FMU does not hold a value; the message names both, and what it holds."""
+
+
 def exact(variable: Any, value: Value, name: str) -> Any:
     """Return a value as the variable's type holds it.
 
@@ -38,7 +41,7 @@ def exact(variable: Any, value: Value, name: str) -> Any:
 
     Raises
     ------
-    MisfitError
+    UnfitError
         If the type does not hold the value, with both and the rule.
     """
     kind = variable.type
@@ -77,7 +80,7 @@ def parsed(variable: Any, text: str, name: str) -> Value:
 
     Raises
     ------
-    MisfitError
+    UnfitError
         If the text is no value of the variable's type.
     """
     kind = variable.type
@@ -108,7 +111,7 @@ def require_within(variable: Any, value: Any, name: str) -> None:
 
     Raises
     ------
-    MisfitError
+    UnfitError
         With the value and the range.
     """
     if isinstance(value, (str, bytes)):
@@ -118,7 +121,13 @@ def require_within(variable: Any, value: Any, name: str) -> None:
         text = getattr(variable, bound) or (getattr(declared, bound) if declared else None)
         limit = None if text is None else float(text) if variable.type in FLOATS else int(text)
         if limit is not None and beyond(value, limit):
-            raise MisfitError(f"{name} is set to {value}, {word} its {bound}imum {text}: give a value in its range.")
+            raise UnfitError(f"{name} is set to {value}, {word} its {bound}imum {text}: give a value in its range.")
+
+
+def access(variable: Any, *, fmi2: bool) -> str:
+    """Return the type in the names of the functions that get and set a variable."""
+    whole = "Integer" if fmi2 else "Int64"
+    return whole if variable.type == "Enumeration" else str(variable.type)
 
 
 def limits(kind: str) -> tuple[int, int]:
@@ -144,7 +153,7 @@ def _float(kind: str, value: float, name: str) -> float:
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise MisfitError(f"{name} is set to {value}: set a finite number.")
+        raise UnfitError(f"{name} is set to {value}: set a finite number.")
     if abs(number) > FLOATS[kind]:
         raise _misfit(name, value, kind, f"give a number of at most {FLOATS[kind]:.8g} in size")
     return number
@@ -169,6 +178,6 @@ def _item(variable: Any, value: Value, name: str) -> int:
     return number
 
 
-def _misfit(name: str, value: Value, kind: str, remedy: str) -> MisfitError:
+def _misfit(name: str, value: Value, kind: str, remedy: str) -> UnfitError:
     article = "an" if kind[0] in "EI" else "a"
-    return MisfitError(f"{name} is set to {value!r}, but it is {article} {kind}: {remedy}.")
+    return UnfitError(f"{name} is set to {value!r}, but it is {article} {kind}: {remedy}.")

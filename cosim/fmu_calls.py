@@ -1,0 +1,68 @@
+"""Calls of an FMU, and what it says in them."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import fmi3Fatal, fmi3OK, fmi3Warning
+
+from cosim.errors import CosimError
+from cosim.slave import Termination
+
+MESSAGES = 100
+"""Most messages of one call that are kept."""
+
+
+class FmuCalls:
+    """Calls the functions of one FMU, and tells in its own words why one failed.
+
+    Parameters
+    ----------
+    name : str
+        Of the slave.
+
+    Attributes
+    ----------
+    fatal : bool
+        Whether a call was fatal; after it no function may be called, the one that frees the instance neither.
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._messages: deque[tuple[int, str]] = deque(maxlen=MESSAGES)
+        self.fatal = False
+
+    def hear(self, status: int, text: str) -> None:
+        """Take a message of the FMU: its status, and its text."""
+        self._messages.append((status, text))
+
+    def __call__(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a function of fmpy.
+
+        Raises
+        ------
+        CosimError
+            If the FMU answers with an error, with the last message of this call.
+        """
+        self._messages.clear()
+        try:
+            return function(*arguments)
+        except FMICallException as error:
+            self.fatal = self.fatal or error.status == fmi3Fatal
+            raise CosimError(f"{self._name}: {error.function} failed: {self.said}") from error
+
+    @property
+    def said(self) -> str:
+        """The last message."""
+        return self._messages[-1][1] if self._messages else "the FMU logged no message"
+
+    def termination(self) -> Termination:
+        """Return why the FMU ended the run in its last call.
+
+        FMI has no reason for terminateSimulation, which is no failure by itself; the message that goes with it tells.
+        """
+        status, text = self._messages[-1] if self._messages else (fmi3OK, "")
+        return Termination(text, "Zeno" in text, failed=status > fmi3Warning)
