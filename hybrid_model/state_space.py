@@ -51,6 +51,11 @@ class LinearAutomaton(HybridAutomaton):
     """What the automata of `state_space` have in common: scalar inputs and outputs, matrices as parameters."""
 
     signals: ClassVar[Signals]
+    made_from: tuple[Any, ...]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return how to make it again: a class made at run time cannot be found by its name, as pickle does."""
+        return _made, self.made_from
 
     def read(self, s: Values, names: Sequence[str]) -> Value:
         """Return scalar variables as one vector."""
@@ -184,7 +189,13 @@ def state_space(
         values["period"] = period
         declared |= {y: DiscreteState(0.0, output=True) for y in outputs}
     made: LinearAutomaton = type(base.__name__, (base,), declared)(name, **values)
+    named = {"inputs": inputs, "outputs": outputs, "period": period, "name": name, "state": state, "start": start}
+    made.made_from = (A, B, C, D, named)
     return made
+
+
+def _made(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, named: dict[str, Any]) -> LinearAutomaton:
+    return state_space(A, B, C, D, **named)
 
 
 def _matrices(given: Mapping[str, FloatArray]) -> tuple[dict[str, Any], dict[str, Any]]:

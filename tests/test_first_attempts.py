@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
+from fmu.compiled import compiled
 from fmu.errors import ExportError
 from fmu.export import export_fmu
 from fmu.trace import trace
 from hybrid_model.models import BouncingBall, RestingBall
+from hybrid_model.state_space import state_space
 
 
 def ball_with(**body):
@@ -358,7 +360,19 @@ class Counter(hm.HybridAutomaton):
 
 
 @pytest.mark.parametrize(
-    "make", [Heating, Counter, BouncingBall, lambda: hm.Composition("both", {"a": Heating(), "b": Counter()})]
+    "make",
+    [
+        Heating,
+        Counter,
+        BouncingBall,
+        lambda: hm.Composition("both", {"a": Heating(), "b": Counter()}),
+        lambda: hm.MinimumDwell(Heating(), 0.1),
+        lambda: compiled(Heating()),
+        lambda: state_space([[-1.0]], [[1.0]], [[2.0]], [[3.0]], inputs=["u"], outputs=["y"], start=1.0),
+        lambda: state_space(
+            [[0.5]], [[1.0]], [[2.0]], inputs=["u"], outputs=["y"], period=0.25, name="clocked", start=1.0
+        ),
+    ],
 )
 @pytest.mark.parametrize("again", [lambda x: pickle.loads(pickle.dumps(x)), copy.copy, copy.deepcopy])
 def test_automata_and_their_arcs_can_be_pickled_and_copied(make, again):

@@ -207,12 +207,32 @@ def _distance_weight(
     horizon: float,
     period: float | None,
 ) -> FunctionWeight:
-    def distance(t: Any) -> Any:
-        return np.sqrt(sum((a - b) ** 2 for a, b in zip(first(t), second(t), strict=True)))
-
+    distance = _Distance(first, second)
     end = period if period is not None else horizon
     kinks = sorted({time for bend in bends for time in _passages(distance, bend, end)})
-    return FunctionWeight(lambda t: law(distance(t)), tuple(kinks), period)
+    return FunctionWeight(_OfDistance(law, distance), tuple(kinks), period)
+
+
+@dataclass(frozen=True)
+class _Distance:
+    """Distance of two positions over time; a class, like the next, since functions in functions cannot be pickled."""
+
+    first: Callable[[Any], Sequence[Any]]
+    second: Callable[[Any], Sequence[Any]]
+
+    def __call__(self, t: Any) -> Any:
+        return np.sqrt(sum((a - b) ** 2 for a, b in zip(self.first(t), self.second(t), strict=True)))
+
+
+@dataclass(frozen=True)
+class _OfDistance:
+    """A law of the distance, as a function of time."""
+
+    law: Callable[[Any], Any]
+    distance: _Distance
+
+    def __call__(self, t: Any) -> Any:
+        return self.law(self.distance(t))
 
 
 def _passages(distance: TimeFunction, bend: float, end: float) -> list[float]:
