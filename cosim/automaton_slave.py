@@ -49,6 +49,7 @@ class AutomatonSlave(Slave):
         self.automaton = automaton
         self._solver = solver
         self._whole = {e for v in automaton.variables if v.integer for e in element_names(v)}
+        self._ranges = {e: (v.minimum, v.maximum) for v in automaton.variables for e in element_names(v)}
         self._names = [element for kind in Kind for element in layout.names(kind)]
         self._predictable = all(port.discrete for port in ports[Kind.INPUT])
         self._starts: dict[str, float] = {}
@@ -70,6 +71,8 @@ class AutomatonSlave(Slave):
             raise MisfitError(f"{self.name}.{name} is set to {value}: set a finite number.")
         if name in self._whole and value != round(value):
             raise MisfitError(f"{self.name}.{name} is set to {value}, but it is an integer: set a whole number.")
+        if self._block is None or name in self.tunable:
+            self._require_within(name, value)
         if self._begun and name not in self.inputs and name not in self.tunable:
             raise MisfitError(
                 f"{self.name}.{name} is fixed once the run has begun: set it before, or declare a parameter with "
@@ -131,6 +134,12 @@ class AutomatonSlave(Slave):
     def close(self) -> None:
         """See `Slave.close`."""
         self._block, self._begun = None, False
+
+    def _require_within(self, name: str, value: float) -> None:
+        low, high = self._ranges[name]
+        if (low is not None and value < low) or (high is not None and value > high):
+            bound = f"below its minimum {low:g}" if low is not None and value < low else f"above its maximum {high:g}"
+            raise MisfitError(f"{self.name}.{name} is set to {value}, {bound}: give a value in its range.")
 
     @property
     def _running(self) -> AutomatonBlock:

@@ -80,7 +80,7 @@ class FmuSlave(Slave):
             raise MisfitError(f"{full_name} is a parameter that is not tunable: set it before the run.")
         try:
             held = exact(variable, value, full_name)
-            if self._access is None:
+            if self._access is None or name in self.tunable:
                 require_within(variable, held, full_name)
         except UnfitError as error:
             raise MisfitError(str(error)) from error

@@ -95,6 +95,36 @@ def test_a_slave_is_tuned_between_steps_and_in_event_mode(block):
     block.close()
 
 
+def test_a_tuned_value_is_part_of_the_state(block):
+    events = block.has_event_mode
+    block.start(0.0, 1.0, events=events)
+    block.begin()
+    if events:
+        block.update()
+        block.enter_step_mode()
+    block.step(0.0, 0.2)
+    state = block.save()
+    block.set("limit", 0.3)
+    block.step(0.2, 0.3)
+    block.restore(state)
+    assert (block.get("limit"), block.get("x")) == (1.0, pytest.approx(0.2, abs=1e-12))
+    block.step(0.2, 0.4)
+    assert block.get("rounds") == 0
+    block.release(state)
+    block.close()
+
+
+def test_a_value_outside_its_range_is_refused_before_and_in_the_run(block):
+    with pytest.raises(MisfitError, match=r"block\.limit is set to 0\.05, below its minimum 0\.1: give a value in"):
+        block.set("limit", 0.05)
+    block.start(0.0, 1.0, events=block.has_event_mode)
+    block.begin()
+    with pytest.raises(MisfitError, match=r"block\.limit is set to 0\.05, below its minimum 0\.1: give a value in"):
+        block.set("limit", 0.05)
+    assert block.get("limit") == 1.0
+    block.close()
+
+
 @pytest.mark.parametrize("name", ["mass", "rounds"])
 def test_what_is_fixed_is_not_set_in_a_run(block, name):
     block.set(name, 1.0)
