@@ -224,7 +224,12 @@ def _own_names(automaton: Automaton, samples: Samples) -> Samples:
 
 def _value(variable: Variable, flat: FloatArray) -> Any:
     array = np.asarray(flat, dtype=np.float64)
-    return array.reshape(variable.shape) if variable.shape else array.reshape(-1)[0]
+    if not variable.shape:
+        return array.reshape(-1)[0]
+    value = array.reshape(variable.shape)
+    # As in a run: a map that writes into it would write into the samples.
+    value.flags.writeable = False
+    return value
 
 
 def _input(variable: Variable, given: Any) -> Any:

@@ -136,6 +136,14 @@ def test_targets_that_are_not_there_are_wrong_usage(here, capsys, target):
     assert not (here / "out").exists()
 
 
+def test_a_class_whose_constructor_leaves_its_base_out(here, capsys):
+    (here / "half.py").write_text(
+        "from hybrid_model.models import BouncingBall\nclass Half(BouncingBall):\n    def __init__(self): pass\n"
+    )
+    assert main(["export", "half.py:Half", "--out", "."]) == 1
+    assert "Half has an __init__ that leaves the variables out: call super().__init__(...)" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "option", [["--fmi", "1.0"], ["--kind", "se"], ["--platform", "linux64"], ["--platform", "x86_64-beos"]]
 )

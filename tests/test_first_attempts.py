@@ -327,6 +327,12 @@ def test_an_array_cannot_be_changed_in_place(where):
         run(wrong())
     with pytest.raises(hm.DeclarationError, match=r"of Wrong writes into a value that it was given: work on a copy"):
         trace(wrong())
+    t = [0.0, 0.5, 0.5]
+    x = np.array([[1.0, 2.0], [4.0, 2.0], [4.0, 2.0]])
+    before = x.copy()
+    with pytest.raises(hm.DeclarationError, match=r"of Wrong writes into a value that it was given: work on a copy"):
+        hm.verify(wrong(), hm.Samples(t, [0, 0, 1], {"x": x}))
+    np.testing.assert_array_equal(x, before)
 
 
 # What a run gives back.

@@ -25,6 +25,7 @@ from fmu.export import export_fmu
 from fmu.platforms import PLATFORMS
 from fmu.variables import Fmi
 from hybrid_model import Automaton
+from hybrid_model.automaton import require_made
 from hybrid_model.consensus.network import scenario_agents
 from hybrid_model.consensus.scenario import load_scenario
 
@@ -140,6 +141,7 @@ def _automata(target: str, starts: dict[str, float]) -> tuple[float | None, dict
         automaton = found(**starts)
     except TypeError as error:
         raise UsageError(f"{target} cannot be made with the start values given: {error}.") from error
+    require_made(automaton)
     return None, {automaton.name: automaton}
 
 
