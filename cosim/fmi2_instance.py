@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +52,17 @@ class Fmi2Instance(FmuInstance):
         except FMICallException as error:
             if error.status != fmi2Discard:
                 raise
-            ended = self.fmu.getBooleanStatus(fmi2Terminated)
-            return Advance(self.fmu.getRealStatus(fmi2LastSuccessfulTime), False, ended, True)
+            ended = self._status(self.fmu.getBooleanStatus, fmi2Terminated, False)
+            return Advance(self._status(self.fmu.getRealStatus, fmi2LastSuccessfulTime, t), False, ended, True)
         return Advance(t + size, False, False, False)
+
+    @staticmethod
+    def _status(ask: Callable[[int], Any], kind: int, otherwise: Any) -> Any:
+        """Return what an FMU says of a discarded step; many have no answer."""
+        try:
+            return ask(kind)
+        except FMICallException:
+            return otherwise
 
     def save(self) -> Any:
         """See `FmuInstance.save`."""

@@ -20,6 +20,7 @@ from fmu.importer.folders import temporary_folder
 from fmu.importer.loading import read_description
 from fmu.importer.unpacking import unpack
 
+_alone: dict[str, str] = {}
 OWN_TOOL = "hybrid-fmu"
 """What FMUs that this project exports say of their tool."""
 
@@ -79,6 +80,28 @@ class FmuFile:
         FMI asks of FMUs that they name their time events; the events on the states of others come unannounced.
         """
         return str(self.description.generationTool).startswith(OWN_TOOL)
+
+    def claim(self) -> None:
+        """Note that an instance is about to be made.
+
+        Raises
+        ------
+        CosimError
+            If there is one already in this process, and the FMU allows no other.
+        """
+        if not self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
+            return
+        other = _alone.setdefault(self.description.guid, self._name)
+        if other != self._name:
+            raise CosimError(
+                f"{self._name} and {other} are one FMU, of which a process may have one instance at a time "
+                "(canBeInstantiatedOnlyOncePerProcess is true): run them in two processes."
+            )
+
+    def yield_claim(self) -> None:
+        """Note that the instance is gone, or could not be made."""
+        if _alone.get(self.description.guid) == self._name:
+            del _alone[self.description.guid]
 
     def load(self, hear: Callable[[int, str], None]) -> FmuInstance:
         """Load the binary, if nobody has, and return its instance to be.

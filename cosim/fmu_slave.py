@@ -114,10 +114,15 @@ class FmuSlave(Slave):
         if events and not self.has_event_mode:
             raise CosimError(f"{self.name} has no event mode: use the fixed-step master.")
         instance = self.load()
+        self._file.claim()
         try:
             self._calls(instance.instantiate, events)
         except Exception as error:
-            raise CosimError(f"{self.name} refuses to be instantiated: {self._calls.said}") from error
+            self._file.yield_claim()
+            other = ". The fixed-step master (--master fixed-step) leaves its event mode off." if events else ""
+            raise CosimError(
+                f"{self.name} refuses to be instantiated: {self._calls.said.rstrip('.')}{other}"
+            ) from error
         self._access = FmuAccess(instance, self._variables, self._calls)
         self._access.start(self._starts)
         self._calls(instance.enter_initialization, t_start, t_stop)
@@ -178,6 +183,7 @@ class FmuSlave(Slave):
             if not self._calls.fatal:
                 self._access.instance.free()
             self._access, self._begun = None, False
+            self._file.yield_claim()
 
     @property
     def _running(self) -> FmuAccess:

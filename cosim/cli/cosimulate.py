@@ -147,7 +147,9 @@ def _run(system: System, options: argparse.Namespace, t_stop: float | None) -> C
         )
     if options.step_size is not None:
         print("hybrid-fmu: --step-size is for the fixed-step master; this run is event-exact.", file=sys.stderr)
-    interval = _given(options.output_interval, proposed, _part(t_stop - t_start, OUTPUT_INTERVAL))
+    # A step is proposed for masters that need short ones; here it is the output that it would make long.
+    dense = proposed is not None and t_stop - t_start > MOST * proposed
+    interval = _given(options.output_interval, None if dense else proposed, _part(t_stop - t_start, OUTPUT_INTERVAL))
     return run_event_exact(system, t_stop, t_start=t_start, output_interval=interval)
 
 

@@ -119,7 +119,8 @@ def require_within(variable: Any, value: Any, name: str) -> None:
     declared = variable.declaredType
     for bound, beyond, word in (("min", operator.lt, "below"), ("max", operator.gt, "above")):
         text = getattr(variable, bound) or (getattr(declared, bound) if declared else None)
-        limit = None if text is None else float(text) if variable.type in FLOATS else int(text)
+        read = float if variable.type in FLOATS else decimal.Decimal  # no rounding in 64-bit integers
+        limit = None if text is None else read(text.replace("INF", "Infinity"))
         if limit is not None and beyond(value, limit):
             raise UnfitError(f"{name} is set to {value}, {word} its {bound}imum {text}: give a value in its range.")
 

@@ -6,7 +6,7 @@
 
 #include "fmi2Functions.h"
 
-enum { WELL, STUCK, ENDS, FAILS, CRAWLS, DIES, BREAKS };
+enum { WELL, STUCK, ENDS, FAILS, CRAWLS, DIES, BREAKS, SHRUGS };
 
 typedef struct {
     const fmi2CallbackFunctions *functions;
@@ -108,6 +108,8 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real point, fmi2Real size, fmi2Boolea
     }
     if (block->behaviour == BREAKS)
         return fmi2Fatal;
+    if (block->behaviour == SHRUGS)
+        return fmi2Discard;
     if (block->behaviour == DIES)
         _Exit(7);
     if (block->behaviour == STUCK)
@@ -127,12 +129,12 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real point, fmi2Real size, fmi2Boolea
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Real *value)
 {
     *value = ((Block *)c)->t;
-    return kind == fmi2LastSuccessfulTime ? fmi2OK : fmi2Discard;
+    return kind == fmi2LastSuccessfulTime && ((Block *)c)->behaviour != SHRUGS ? fmi2OK : fmi2Discard;
 }
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
 {
     *value = ((Block *)c)->ended;
-    return kind == fmi2Terminated ? fmi2OK : fmi2Discard;
+    return kind == fmi2Terminated && ((Block *)c)->behaviour != SHRUGS ? fmi2OK : fmi2Discard;
 }
 
 /* What the standard wants to be there. */

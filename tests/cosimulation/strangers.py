@@ -7,7 +7,7 @@ import fmpy
 WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS = range(7)
 """Behaviours of `stranger3.c`."""
 TYPES = {
-    "Float64": 'max="1e6"',
+    "Float64": 'min="-0.1" max="1e6"',
     "Float32": "",
     "Int8": "",
     "UInt8": "",
@@ -72,12 +72,13 @@ def _echoes():
 
 
 def write_stranger3(
-    path, binary, *, events=True, states=True, variable=True, token="", experiment='stopTime="2"', kind=None
+    path, binary, *, events=True, states=True, variable=True, alone=False, experiment='stopTime="2"', kind=None
 ):
-    """Write an FMU of FMI 3.0: its flags, words of its token, and its default experiment."""
+    """Write an FMU of FMI 3.0: its flags, its default experiment, and another interface than Co-Simulation."""
     flags = {"hasEventMode": events, "canGetAndSetFMUState": states, "canHandleVariableCommunicationStepSize": variable}
+    flags["canBeInstantiatedOnlyOncePerProcess"] = alone
     content = _DESCRIPTION.format(
-        token=f"{token}{'' if states else ' stateless'}{'' if variable else ' rigid'}",
+        token=f"{'' if states else 'stateless'} {'' if variable else 'rigid'}",
         kind=kind or "CoSimulation",
         flags=" ".join(f'{name}="true"' for name, given in flags.items() if given) if kind is None else "",
         experiment=experiment,

@@ -25,6 +25,7 @@ def echoed(path, kind, text):
     ("kind", "text", "value"),
     [
         ("float64", "0.1", 0.1),
+        ("float64", "-0.1", -0.1),
         ("float32", "0.5", 0.5),
         ("int8", "-128", -128),
         ("uint8", "255", 255),

@@ -51,7 +51,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
   <ModelStructure><Outputs><Unknown index="1"/><Unknown index="5"/></Outputs></ModelStructure>
 </fmiModelDescription>
 """
-STUCK, ENDS, FAILS, CRAWLS, DIES, BREAKS = 1, 2, 3, 4, 5, 6
+STUCK, ENDS, FAILS, CRAWLS, DIES, BREAKS, SHRUGS = 1, 2, 3, 4, 5, 6, 7
 
 
 @pytest.fixture
@@ -233,6 +233,7 @@ def test_an_fmu_that_ends_the_run_says_when_and_why(other):
 @pytest.mark.parametrize(
     ("behaviour", "sentence"),
     [
+        (SHRUGS, "other returns from a step at 0 s and gets no further"),
         (STUCK, "other returns from a step at 0 s and gets no further"),
         (CRAWLS, "other returned early from one step 10000 times"),
         (FAILS, "other: fmi2DoStep failed: no solution at 0"),

@@ -68,6 +68,16 @@ def test_what_cannot_return_and_is_sent_something_is_named(stranger):
         run_event_exact(system, 4.0)
 
 
+def test_an_fmu_that_may_be_there_once_is_not_instantiated_twice(stranger):
+    path = stranger(alone=True)
+    first, second = slave_of(path, "a"), slave_of(path, "b")
+    for _ in range(2):  # once at a time: a run after the other is no matter
+        assert exact(System([first], {})).ended is Ended.HORIZON
+    with pytest.raises(CosimError, match=r"b and a are one FMU, of which a process may have one instance"):
+        exact(System([first, second], {}))
+    assert exact(System([second], {})).ended is Ended.HORIZON
+
+
 def test_an_fmu_that_returns_early_without_an_event_is_carried_on(stranger):
     result = exact(System([slave_of(stranger(), rate=0.7, behaviour=PANTS)], {}))
     np.testing.assert_allclose(result.event_times("stranger"), [1 / 0.7], rtol=1e-15)
