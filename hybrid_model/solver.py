@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
 
 from hybrid_model.errors import SimulationError
+from hybrid_model.real_numbers import is_real, told
+from hybrid_model.signatures import ExplainedCall
 
 
 class Method(enum.Enum):
@@ -23,7 +25,7 @@ class Method(enum.Enum):
 
 
 @dataclass(frozen=True)
-class Solver:
+class Solver(ExplainedCall):
     """Accuracy of a run.
 
     Attributes
@@ -57,6 +59,10 @@ class Solver:
     def __post_init__(self) -> None:
         if not isinstance(self.method, Method):
             object.__setattr__(self, "method", _by_name(self.method))
+        for field in fields(self):
+            given = getattr(self, field.name)
+            if not (field.name == "method" or given is field.default or is_real(given)):
+                raise SimulationError(f"solver option {field.name} = {told(given)}: give a number.")
         for name in ("rtol", "atol", "max_step", "scan_points", "event_tolerance"):
             value = getattr(self, name)
             if not value > 0 or (math.isinf(value) and name != "max_step"):

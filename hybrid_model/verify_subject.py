@@ -12,9 +12,10 @@ import numpy as np
 from hybrid_model.arc import HybridArc
 from hybrid_model.automaton import Automaton
 from hybrid_model.errors import DataError, DeclarationError
-from hybrid_model.real_numbers import real_array, told
+from hybrid_model.real_numbers import is_real, real_array, told
 from hybrid_model.samples import Samples
 from hybrid_model.signals import InputValue, Signal, require_tunable, unknown_input
+from hybrid_model.signatures import ExplainedCall
 from hybrid_model.transitions import Assignments, Trigger
 from hybrid_model.variables import FloatArray, Kind, Values, Variable
 
@@ -23,7 +24,7 @@ InputAt = Callable[[float, int], Any]
 
 
 @dataclass(frozen=True)
-class Tolerances:
+class Tolerances(ExplainedCall):
     """How exact samples must be to count as a hybrid arc.
 
     Attributes
@@ -46,8 +47,9 @@ class Tolerances:
 
     def __post_init__(self) -> None:
         for name in ("time", "rtol", "atol"):
-            if not 0.0 < getattr(self, name) < math.inf:
-                raise DataError(f"tolerance {name} = {getattr(self, name)}: give a positive number.")
+            given = getattr(self, name)
+            if not (is_real(given) and 0.0 < given < math.inf):
+                raise DataError(f"tolerance {name} = {told(given)}: give a positive number.")
 
 
 class Subject:
