@@ -64,6 +64,7 @@ class FmuSlave(Slave):
         self._access: FmuAccess | None = None
         self._begun = False
         self._starts: dict[str, Any] = {}
+        self._events = False
         self._step_size = math.nan
 
     @property
@@ -115,6 +116,7 @@ class FmuSlave(Slave):
             raise CosimError(f"{self.name} has no event mode: use the fixed-step master.")
         instance = self.load()
         self._file.claim()
+        self._events = events
         try:
             self._calls(instance.instantiate, events)
         except Exception as error:
@@ -153,7 +155,7 @@ class FmuSlave(Slave):
             told, event, terminate, early = self._calls(instance.step, t, self._size(t_next - t))
             # The last successful time is where an FMU is only if it returned early (FMI 3.0.2 section 4.2).
             reached = told if (early or terminate) and not _are_one(told, t_next) else t_next
-            if event or terminate or reached >= t_next:
+            if (event and self._events) or terminate or reached >= t_next:
                 return Step(reached, event, self._calls.termination() if terminate else None)
             if not reached > t:
                 raise CosimError(

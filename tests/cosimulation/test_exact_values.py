@@ -11,6 +11,7 @@ from cosim.errors import CosimError, MisfitError
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.system import System
+from fmu.flow_functions import FlowError, FlowFunctions
 
 
 def echoed(path, kind, text):
@@ -189,3 +190,11 @@ def test_our_own_integers_take_whole_numbers(kind, exported):
         slave.set("most", math.nan)
     slave.set("n", 2)
     assert run_fixed_step(System([slave], {}), 0.1, 0.1).final["a.n"] == 2
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_flow_functions_take_values_by_the_same_rules(fmi, exported):
+    path = exported(Counted(), "counted", fmi)
+    with pytest.raises(FlowError, match=r"n is set to 1\.5, but it is an Int"):
+        FlowFunctions(path, {"n": 1.5})
+    FlowFunctions(path, {"n": 2}).close()

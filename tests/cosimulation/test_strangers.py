@@ -97,6 +97,13 @@ def test_strangers_that_get_no_further_are_named(behaviour, sentence, stranger):
         exact(System([slave_of(stranger(), behaviour=behaviour)], {}))
 
 
+def test_an_event_that_nobody_handles_does_not_end_a_step(stranger):
+    """FMI forbids it to say so where event mode is off; a step that ended there would lose its rest in silence."""
+    slave = slave_of(stranger(), behaviour=REPEATS)
+    with pytest.raises(CosimError, match="stranger returns from a step at 0 s and gets no further"):
+        run_fixed_step(System([slave], {}), 1.0, 0.1)
+
+
 @pytest.mark.parametrize("events", [True, False])
 def test_a_stranger_that_ends_the_run_has_come_to_its_end(events, stranger, tmp_path, capsys):
     path = stranger(events=events, experiment='stopTime="10" stepSize="0.25"')
