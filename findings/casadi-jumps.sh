@@ -20,7 +20,7 @@ cat > "$work/ball.c" <<'C'
 #include <stdlib.h>
 typedef unsigned R;
 enum { H, V, DH, DV };
-static double x[2];
+#define x ((double *)c)
 #define OK(name, ...) int name(__VA_ARGS__) { return 0; }
 #define REFUSED(name, ...) int name(__VA_ARGS__) { return 3; }
 const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -28,10 +28,11 @@ const char *fmi2GetVersion(void) { return "2.0"; }
 int fmi2Reset(void *c) { x[H] = 1.0, x[V] = 0.0; return 0; }
 void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, const void *f, int v, int l)
 {
-    fmi2Reset(x);
-    return x;
+    void *c = malloc(2 * sizeof(double));
+    fmi2Reset(c);
+    return c;
 }
-void fmi2FreeInstance(void *c) {}
+void fmi2FreeInstance(void *c) { free(c); }
 OK(fmi2SetDebugLogging, void *c, int on, size_t n, const char **k)
 OK(fmi2SetupExperiment, void *c, int d, double tol, double t, int s, double e)
 OK(fmi2EnterInitializationMode, void *c)
@@ -49,8 +50,8 @@ int fmi2NewDiscreteStates(void *c, struct { int again, end, nominals, values, ha
     return 0;
 }
 int fmi2CompletedIntegratorStep(void *c, int no, int *event, int *end) { return *event = *end = 0; }
-static double rate(int k) { return k == H ? x[V] : -9.81; }
-int fmi2GetDerivatives(void *c, double *d, size_t n) { d[0] = rate(H), d[1] = rate(V); return 0; }
+static double rate(void *c, int k) { return k == H ? x[V] : -9.81; }
+int fmi2GetDerivatives(void *c, double *d, size_t n) { d[0] = rate(c, H), d[1] = rate(c, V); return 0; }
 int fmi2GetContinuousStates(void *c, double *s, size_t n) { s[0] = x[H], s[1] = x[V]; return 0; }
 int fmi2SetContinuousStates(void *c, const double *s, size_t n) { x[H] = s[0], x[V] = s[1]; return 0; }
 int fmi2GetNominalsOfContinuousStates(void *c, double *s, size_t n) { s[0] = s[1] = 1.0; return 0; }
@@ -59,7 +60,7 @@ int fmi2GetEventIndicators(void *c, double *z, size_t n) { z[0] = x[H] + (x[V] >
 int fmi2GetReal(void *c, const R *r, size_t n, double *y)
 {
     for (size_t i = 0; i < n; i++)
-        y[i] = r[i] < DH ? x[r[i]] : rate(r[i] - DH);
+        y[i] = r[i] < DH ? x[r[i]] : rate(c, r[i] - DH);
     return 0;
 }
 int fmi2SetReal(void *c, const R *r, size_t n, const double *y)

@@ -18,13 +18,18 @@ mkdir -p "$work/fmu/binaries/linux64"
 cat > "$work/body.c" <<'C'
 #include <stdlib.h>
 typedef unsigned R;
-static double T = 300.0;
+#define T (*(double *)c)
 #define OK(name, ...) int name(__VA_ARGS__) { return 0; }
 #define REFUSED(name, ...) int name(__VA_ARGS__) { return 3; }
 const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
-void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, const void *f, int v, int l) { return &T; }
-void fmi2FreeInstance(void *c) {}
+void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, const void *f, int v, int l)
+{
+    double *c = malloc(sizeof(double));
+    *c = 300.0;
+    return c;
+}
+void fmi2FreeInstance(void *c) { free(c); }
 OK(fmi2SetDebugLogging, void *c, int on, size_t n, const char **k)
 OK(fmi2SetupExperiment, void *c, int d, double tol, double t, int s, double e)
 OK(fmi2EnterInitializationMode, void *c)

@@ -18,22 +18,25 @@ mkdir -p "$work/ramp/binaries/linux64"
 cat > "$work/ramp.c" <<'C'
 #include <stdlib.h>
 typedef unsigned R;
-static double now;
+#define NOW (*(double *)c)
 #define OK(name, ...) int name(__VA_ARGS__) { return 0; }
 #define REFUSED(name, ...) int name(__VA_ARGS__) { return 3; }
 const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
-void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, const void *f, int v, int l) { return &now; }
-void fmi2FreeInstance(void *c) {}
+void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, const void *f, int v, int l)
+{
+    return calloc(1, sizeof(double));
+}
+void fmi2FreeInstance(void *c) { free(c); }
 OK(fmi2SetDebugLogging, void *c, int on, size_t n, const char **k)
 OK(fmi2SetupExperiment, void *c, int d, double tol, double t, int s, double e)
 OK(fmi2EnterInitializationMode, void *c)
 OK(fmi2ExitInitializationMode, void *c)
 OK(fmi2Terminate, void *c)
-int fmi2Reset(void *c) { now = 0.0; return 0; }
-int fmi2GetReal(void *c, const R *r, size_t n, double *x) { for (size_t i = 0; i < n; i++) x[i] = now; return 0; }
+int fmi2Reset(void *c) { NOW = 0.0; return 0; }
+int fmi2GetReal(void *c, const R *r, size_t n, double *x) { for (size_t i = 0; i < n; i++) x[i] = NOW; return 0; }
 REFUSED(fmi2SetReal, void *c, const R *r, size_t n, const double *x)
-int fmi2DoStep(void *c, double t, double h, int no) { now = t + h; return 0; }
+int fmi2DoStep(void *c, double t, double h, int no) { NOW = t + h; return 0; }
 OK(fmi2CancelStep, void *c)
 REFUSED(fmi2GetInteger, void *c, const R *r, size_t n, int *x)
 REFUSED(fmi2GetBoolean, void *c, const R *r, size_t n, int *x)
