@@ -113,6 +113,10 @@ def load_arc(path: str | Path) -> HybridArc:
     FileNotFoundError
         If there is no file.
     """
+    if Path(path).suffix.lower() == ".csv":
+        raise DataError(
+            f"{path} holds samples alone, if anything: read it by hm.Samples.from_csv; arcs are .npz files."
+        )
     content = _content(Path(path))
     try:
         return _arc(content)
