@@ -312,8 +312,9 @@ class HybridAutomaton(Automaton):
         return self._scalar(what, "a margin, one number that is zero or above inside the set", margin)
 
     def _scalar(self, what: str, wanted: str, value: Value) -> Value:
-        traced = not isinstance(value, NO_SYMBOLS) or (isinstance(value, np.ndarray) and value.dtype.kind == "O")
-        if type(value) in FLOATS or traced:
+        if type(value) in FLOATS:
+            return value
+        if not isinstance(value, NO_SYMBOLS) or (isinstance(value, np.ndarray) and value.dtype.kind == "O"):
             return value
         try:
             number = real_array(value)

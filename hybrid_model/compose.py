@@ -267,13 +267,18 @@ class _PartValues(Values):
     """Values of a part, each fetched when it is asked for, so that only real dependencies count as loops."""
 
     __slots__ = ("_own", "_s", "_scopes", "_wires")
+    _own: dict[str, str]
+    _s: Values
+    _scopes: _Scopes
+    _wires: dict[str, _Wire]
 
     def __init__(self, composition: Composition, part: str, scopes: _Scopes, s: Values) -> None:
         super().__init__(composition.parts[part].name, {})
-        self._own = composition._own[part]
-        self._wires = composition._wires[part]
-        self._scopes = scopes
-        self._s = s
+        # Past `__setattr__`, as in `Values`.
+        _set_own(self, composition._own[part])
+        _set_s(self, s)
+        _set_scopes(self, scopes)
+        _set_wires(self, composition._wires[part])
 
     def __getitem__(self, name: str) -> Value:
         value = self._values.get(name)
@@ -286,6 +291,9 @@ class _PartValues(Values):
                 raise DeclarationError(unknown_name(self._owner, name, {**self._own, **self._wires}))
             self._values[name] = value
         return value
+
+
+_set_own, _set_s, _set_scopes, _set_wires = (vars(_PartValues)[slot].__set__ for slot in _PartValues.__slots__)
 
 
 def _require_arguments(name: object, parts: object, connections: object, names: object) -> None:

@@ -29,10 +29,7 @@ class Place:
         if not self.variable.shape:
             return vector[self.at.start]
         part = vector[self.at]
-        part = part if len(self.variable.shape) == 1 else part.reshape(self.variable.shape)
-        # A map that writes into it would write into the state of the run.
-        part.flags.writeable = False
-        return part
+        return part if len(self.variable.shape) == 1 else part.reshape(self.variable.shape)
 
 
 class Layout:
@@ -56,6 +53,15 @@ class Layout:
                 at += variable.size
             self.places[kind] = tuple(places)
             self.sizes[kind] = at
+        # Values are read in the inner loop of every run, so what does not change is looked up once.
+        self._entries = tuple(
+            tuple(
+                (p.variable.name, p.at if p.variable.shape else p.at.start, p.variable.shape[1:] and p.variable.shape)
+                for p in self.places[kind]
+            )
+            for kind in (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
+        )
+        self._has_arrays = tuple(any(isinstance(at, slice) for _, at, _ in entries) for entries in self._entries)
 
     def start(self, kind: Kind) -> FloatArray:
         """Return the vector of start values of one kind."""
@@ -69,9 +75,13 @@ class Layout:
     def values(self, t: Value, x: Value, z: Value, u: Value, p: Value) -> Values:
         """Return the values at one instant, by name; works for vectors of floats and of symbols."""
         values: dict[str, Value] = {"t": t}
-        for kind, vector in ((Kind.STATE, x), (Kind.DISCRETE, z), (Kind.INPUT, u), (Kind.PARAMETER, p)):
-            for place in self.places[kind]:
-                values[place.variable.name] = place.take(vector)
+        for vector, entries, has_arrays in zip((x, z, u, p), self._entries, self._has_arrays, strict=True):
+            if has_arrays:
+                # A map that writes into an array would write into the state of the run.
+                vector = vector[:]
+                vector.flags.writeable = False
+            for name, at, shape in entries:
+                values[name] = vector[at].reshape(shape) if shape else vector[at]
         return Values(self.automaton.name, values)
 
     def pack(self, kind: Kind, assignments: Assignments, otherwise: FloatArray | None = None) -> FloatArray:
