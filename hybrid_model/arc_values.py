@@ -64,6 +64,12 @@ class ArcValues(ABC):
         """
         if name not in self._places:
             known = {variable.name: variable for variable in self.automaton.variables}
+            whole = name.partition("[")[0] if isinstance(name, str) else name
+            if whole in self._places and whole != name:
+                raise DeclarationError(
+                    f"{name} is an element of {whole}: write arc[{whole!r}][:, i], counted from 0; names of elements "
+                    "are for plots and tables."
+                )
             raise DeclarationError(unknown_name(self.automaton.name, name, known))
         return self._places[name].variable
 

@@ -133,7 +133,9 @@ class Inputs:
         given = start_array(f"{self._layout.automaton.name}.{name}", value)
         if given.shape not in ((), place.variable.shape):
             raise DeclarationError(
-                f"input {name} has shape {place.variable.shape}, but the value given has shape {given.shape}."
+                f"input {name} has shape {place.variable.shape}, but the value given has shape {given.shape}: give one "
+                "number, or an array of that shape; a table over time is a function, "
+                "lambda t: np.interp(t, times, values)."
             )
         before, self._held = self._held, self._held.copy()
         self._held[place.at] = given.ravel() if given.shape else given

@@ -9,6 +9,7 @@ from hybrid_model.consensus.continuous import ContinuousIntegrator
 from hybrid_model.consensus.edge_blocks import switching_block, weights_block
 from hybrid_model.consensus.integrator import Integrator
 from hybrid_model.consensus.scenario_data import Scenario, TriggerKind
+from hybrid_model.consensus.tables import ScenarioError
 from hybrid_model.consensus.trigger_blocks import Surroundings, trigger_block
 
 
@@ -54,7 +55,15 @@ def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
 
 
 def closed_loop(scenario: Scenario) -> hm.Composition:
-    """Compose the agents of a scenario to one automaton."""
+    """Compose the agents of a scenario to one automaton.
+
+    Raises
+    ------
+    ScenarioError
+        If `scenario` is no scenario, such as the name of one.
+    """
+    if not isinstance(scenario, Scenario):
+        raise ScenarioError(f"closed_loop was given {scenario!r}: write closed_loop(load_scenario(name or path)).")
     return hm.Composition(scenario.name, scenario_agents(scenario), broadcast_wires(scenario))
 
 

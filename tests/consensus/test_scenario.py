@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hybrid_model.consensus.graphs import complete_edges
+from hybrid_model.consensus.network import closed_loop
 from hybrid_model.consensus.scenario import (
     NoSwitching,
     PeriodicSwitching,
@@ -231,3 +232,11 @@ class TestValues:
 def test_refusals_name_the_entry_the_value_and_the_rule(path, value, message):
     with pytest.raises(ScenarioError, match=message):
         read_scenario(changed(path, value))
+
+
+@pytest.mark.parametrize("given", ["paper-a", None, {"name": "paper-a"}])
+def test_a_closed_loop_of_what_is_no_scenario(given):
+    with pytest.raises(
+        ScenarioError, match=r"^closed_loop was given .*: write closed_loop\(load_scenario\(name or path\)\)"
+    ):
+        closed_loop(given)

@@ -151,6 +151,15 @@ def traces_of(parts, cls, monkeypatch):
     return count / 2
 
 
+def test_a_part_that_changes_from_call_to_call_is_found_in_a_network():
+    class Noisy(Part):
+        def rate(self):
+            return np.random.default_rng().random()
+
+    with pytest.raises(TraceError, match=r"^flow_map of p0 is another one when it is called again"):
+        network_trace(ring({f"p{k}": Noisy(f"p{k}") for k in range(3)}))
+
+
 def test_equal_parts_are_traced_once(monkeypatch):
     assert traces_of([Part(f"p{k}", k) for k in range(20)], Part, monkeypatch) == 1
     assert traces_of([ByNumber(f"p{k}", 0.1 * (k % 3)) for k in range(20)], ByNumber, monkeypatch) == 3
