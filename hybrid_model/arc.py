@@ -224,7 +224,7 @@ class HybridArc:
         grid : array_like, shape (n,)
             Times in s within the run.
         names : iterable of str, optional
-            Which variables; default: all but the parameters.
+            Which variables; default: all but the parameters that are fixed for a run.
         both_sides : bool
             Whether a time at which the run jumps gives two rows, before its first and after its last jump there;
             default: one row, after the last.
@@ -261,7 +261,7 @@ class HybridArc:
         Parameters
         ----------
         names : iterable of str, optional
-            Which variables; default: all but the parameters.
+            Which variables; default: all but the parameters that are fixed for a run.
         """
         points = [(t, x, flow.z) for flow in self._flows for t, x in flow.points]
         return Samples(self.t.copy(), self.j.copy(), self._table(names, points))

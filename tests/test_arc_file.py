@@ -228,12 +228,29 @@ def rewritten(path, **changes):
         ({"piece_parts": np.array([1])}, "is damaged"),
         ({"part_points": np.array([9999])}, "is damaged"),
         ({"event_tolerance": np.array("soon")}, "is damaged"),
+        ({"parameter_times": np.array([0.0, 1.0])}, "is damaged"),
     ],
 )
 def test_files_that_do_not_fit_are_refused_with_a_sentence(saved, changes, message):
     rewritten(saved, **changes)
     with pytest.raises(hm.DataError, match=message):
         hm.load_arc(saved)
+
+
+def test_files_of_the_first_version_are_read(saved):
+    """They have the parameters as one row, and nothing about which may be tuned."""
+    with np.load(saved) as file:
+        about = json.loads(bytes(file["about"]))
+        row = file["parameters"][0]
+    for variable in about["variables"]:
+        del variable["tunable"]
+    old = np.frombuffer(json.dumps(about).encode(), dtype=np.uint8)
+    rewritten(saved, version=np.array(1), parameters=row, parameter_times=None, about=old)
+    back = hm.load_arc(saved)
+    assert (float(back.at("g", 0.5)), float(back.at("e", 0.9))) == (9.81, 0.7)
+    assert not back.variable("e").tunable
+    with np.load(saved) as file:
+        assert "parameter_times" not in file
 
 
 def test_other_files_are_refused_with_a_sentence(tmp_path):

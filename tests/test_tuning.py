@@ -102,7 +102,7 @@ def test_the_arc_tells_the_parameters_in_time(arc, tmp_path):
             assert told.at(name, within).tolist() == [held(name, t) for t in within]
         assert told["g"].tolist() == [held("g", t) for t in told.t]
     samples = arc.samples()
-    assert set(CHANGES) <= set(samples.values)
+    assert {*CHANGES, "gains"} <= set(samples.values)
     assert "mass" not in samples.values
 
 
@@ -150,6 +150,16 @@ def test_a_signal_is_asked_at_the_start_and_at_its_breakpoints_only():
     assert asked == [0.25, 0.5, 0.75]
     assert float(arc.at("x", 0.45)) == pytest.approx(0.2 * 1.25, abs=STATE)
     assert float(arc.at("slope", 0.7)) == 1.5
+
+
+def test_an_array_is_tuned_as_a_whole():
+    both = hm.Signal(lambda t: [5.0, 2.0] if t >= 0.4 else [1.0, 3.0], [0.4])
+    arc = hm.simulate(Tuned(), 0.6, inputs={"gains": both})
+    assert arc.at("mix", [0.2, 0.5, 0.6]) == pytest.approx([0.2, 2.5, 5.0], abs=STATE)
+    assert arc.at("gains", [0.2, 0.4]).tolist() == [[1.0, 3.0], [5.0, 2.0]]
+    assert hm.verify(Tuned(), arc).ok
+    one = hm.simulate(Tuned(), 0.3, inputs={"gains": 2.0})
+    assert one["gains"][0].tolist() == [2.0, 2.0]
 
 
 def test_a_change_at_the_very_end_counts_as_other_events_there_do():

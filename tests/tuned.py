@@ -32,6 +32,7 @@ class Tuned(hm.HybridAutomaton):
     g = hm.Parameter(8.0, tunable=True, unit="m/s2")
     e = hm.Parameter(0.75, tunable=True)
     mass = hm.Parameter(2.0, unit="kg")
+    gains = hm.Parameter([1.0, 3.0], tunable=True)
     x = hm.State(0.0, output=True)
     h = hm.State(0.81, unit="m", output=True)
     v = hm.State(0.0, unit="m/s", output=True)
@@ -41,6 +42,7 @@ class Tuned(hm.HybridAutomaton):
     bounces = hm.DiscreteState(0, integer=True, output=True)
     weight = hm.Output(unit="N", description="follows g at once")
     rest = hm.Output(description="share of the limit that is left")
+    mix = hm.Output()
     round_clock = hm.Clock("round")
     tick_clock = hm.Clock("tick")
     bounce_clock = hm.Clock("bounce")
@@ -52,7 +54,7 @@ class Tuned(hm.HybridAutomaton):
         return s.h
 
     def outputs(self, s):
-        return {"weight": s.mass * s.g, "rest": 1.0 - s.x / s.limit}
+        return {"weight": s.mass * s.g, "rest": 1.0 - s.x / s.limit, "mix": s.gains @ np.stack([s.x, s.ticks])}
 
     transitions = (
         hm.Jump("round", lambda self, s: s.x - s.limit, lambda self, s: {"x": 0.0, "rounds": s.rounds + 1}),

@@ -138,7 +138,7 @@ def test_what_is_fixed_is_not_set_in_a_run(block, name):
 def test_names_and_values_that_cannot_be(block):
     system = System([block, AutomatonSlave("counter", Counter())], {"counter.heard": "block.rounds"})
     for name, message in (
-        ("block.mass", "neither an input nor a tunable parameter, .*of block are slope, limit, period, g, e"),
+        ("block.mass", "neither an input nor a tunable parameter, .*of block are slope, limit, period, g, e, gains"),
         ("counter.heard", "cannot be given a value, for block.rounds -> counter.heard drives it"),
         ("nobody.limit", "names no slave"),
     ):

@@ -35,6 +35,11 @@ def check_values(component, t):
         assert component.get(name) == pytest.approx(value, abs=STATE), (name, t)
 
 
+def gains(fmi):
+    """The one array among the parameters, which FMI 2.0 has element by element."""
+    return {"gains"} if fmi == "3.0" else {"gains[1]", "gains[2]"}
+
+
 def tuned_at(t):
     return {name: value for name, rows in CHANGES.items() for at, value in rows if at == t}
 
@@ -176,6 +181,21 @@ def test_when_parameters_may_be_set(fmi, kind, path):
 
 
 @VERSIONS
+def test_elements_of_arrays_are_tuned(fmi, path):
+    component = Component(Binary(path(fmi)), "cs")
+    component.begin()
+    component.step(0.0, 0.4)
+    assert component.get("mix") == pytest.approx(0.4, abs=STATE)
+    component.set("gains[1]", 5.0)
+    component.set("gains[2]", 2.0)
+    assert component.get("mix") == pytest.approx(2.0, abs=STATE)
+    component.step(0.4, 0.2)
+    # The timer has ticked at 0.55 s.
+    assert component.get("mix") == pytest.approx(5.0 * 0.6 + 2.0, abs=STATE)
+    component.free()
+
+
+@VERSIONS
 def test_values_that_are_no_numbers_are_refused(fmi, path):
     component = Component(Binary(path(fmi)), "cs")
     component.begin()
@@ -214,7 +234,7 @@ def test_derivatives_are_those_at_the_tuned_values(fmi, path):
 def test_the_description_says_which_are_tunable(fmi, path):
     binary = Binary(path(fmi))
     found = {name: v.variability for name, v in binary.variables.items() if v.causality == "parameter"}
-    assert {name for name, variability in found.items() if variability == "tunable"} == set(CHANGES)
+    assert {name for name, variability in found.items() if variability == "tunable"} == {*CHANGES, *gains(fmi)}
     assert found["mass"] == "fixed"
     [output] = [u for u in binary.description.outputs if u.variable.name == "rest"]
     kinds = {v.name: kind for v, kind in zip(output.dependencies, output.dependenciesKind, strict=True)}
@@ -232,7 +252,7 @@ def test_the_checker_and_the_page_know_them(fmi, path):
     assert {finding.severity for finding in check_fmu(path(fmi)).findings} <= {Severity.NOTE}
     with zipfile.ZipFile(path(fmi)) as archive:
         page = archive.read("documentation/index.html").decode()
-    assert page.count("tunable parameter") == len(CHANGES)
+    assert page.count("tunable parameter") == len(CHANGES) + len(gains(fmi))
     assert "may be set" in page
 
 
