@@ -11,6 +11,7 @@ from fmu.check.description import Description, true
 from fmu.check.findings import Finding, note, quoted, softened
 from fmu.check.plan import ADJOINT, DIRECTIONAL, LARGEST_ARRAY, plan_of
 from fmu.check.plan_claims import claims
+from fmu.check.plan_moves import moves
 from fmu.check.platforms import EXTENSIONS, parts_of, runs_here, this_machine
 
 MISUSE = ("token", "bad steps")
@@ -51,7 +52,9 @@ def run_fmu(folder: Path, description: Description, limits: RunLimits) -> tuple[
             )
             continue
         plan = plan_of(folder, binary, description, kind)
-        found = _run_kind(plan, {**_experiments(kind, attributes), **claims(description, kind)}, limits)
+        found = _run_kind(
+            plan, {**_experiments(kind, attributes), **claims(description, kind), **moves(description, kind)}, limits
+        )
         if not any(finding.rule == "run.library" for _, finding in found):
             executed.append(kind)
         findings += _told_once(kind, found)

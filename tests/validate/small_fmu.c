@@ -121,11 +121,11 @@ static int step(State* s, double t, double h) {
 #elif !defined(FAULT_ANY_STEP)
     if (!(h > 0.0)) return ERROR;
 #endif
-    s->x += (-s->rate * s->x + s->u) * h - 1e-3 * s->memory;
+    s->x += (-s->rate * s->x + s->u) * h - 1e-2 * s->memory;
     s->memory += h;
     s->t = t + h;
 #ifndef REPEATED
-#define REPEATED 1e-3
+#define REPEATED 1e-2
 #endif
 #ifdef FAULT_REPEAT
     static int calls;
@@ -133,7 +133,7 @@ static int step(State* s, double t, double h) {
 #endif
     s->calls++;
 #ifdef FAULT_STATE
-    s->x += 1e-3 * (s->calls % 7);
+    s->x += 1e-2 * (s->calls % 7);
 #endif
     return OK;
 }
@@ -273,7 +273,7 @@ API int fmi3DeserializeFMUState(State* s, const uint8_t* in, size_t n, void** ou
     copy(s, out);
     memcpy(*out, in, n);
 #ifdef FAULT_SERIALIZE
-    ((State*)*out)->x += 1e-3;
+    ((State*)*out)->x += 1e-2;
 #endif
     return OK;
 }

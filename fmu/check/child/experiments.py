@@ -15,8 +15,10 @@ from fmu.check.child.comparison import Whole, compare
 from fmu.check.child.dependencies import dependencies
 from fmu.check.child.fmi2 import Fmi2
 from fmu.check.child.fmi3 import Fmi3
+from fmu.check.child.perturbation import moved_starts, moved_states
 from fmu.check.child.run import Run
 from fmu.check.child.runs import instantiate, run_of
+from fmu.check.child.slopes import slopes
 from fmu.check.child.start_values import start_values
 
 POINTS = 400
@@ -171,6 +173,9 @@ EXPERIMENTS = {
     "evaluation": evaluation,
     "element_dependencies": element_dependencies,
     "dependencies": dependencies,
+    "moved_states": moved_states,
+    "moved_starts": moved_starts,
+    "slopes": slopes,
 }
 
 

@@ -99,6 +99,12 @@ class Fmi2(Library):
         references = (c.c_uint * 1)(variable.reference)
         self.do(f"Set{kind}", references, c.c_size_t(1), (made * 1)(value), shown=variable.name)
 
+    def put(self, variable: Variable, values: list[float]) -> None:
+        """Set a floating point variable."""
+        self.do(
+            "SetReal", (c.c_uint * 1)(variable.reference), c.c_size_t(1), (c.c_double * 1)(*values), shown=variable.name
+        )
+
     def get(self, variable: Variable) -> tuple[list[Any], bytes]:
         """Return a variable's values, and their bits."""
         kind, made = TYPES[variable.type]

@@ -93,6 +93,13 @@ class Fmi3(Library):
         references = (c.c_uint32 * 1)(variable.reference)
         self.do(f"Set{kind}", references, c.c_size_t(1), array, c.c_size_t(len(values)), shown=variable.name)
 
+    def put(self, variable: Variable, values: list[float]) -> None:
+        """Set a floating point variable."""
+        array, size = (TYPES[variable.type] * len(values))(*values), c.c_size_t(len(values))
+        self.do(
+            f"Set{variable.type}", (c.c_uint32 * 1)(variable.reference), c.c_size_t(1), array, size, shown=variable.name
+        )
+
     def get(self, variable: Variable) -> tuple[list[Any], bytes]:
         """Return a variable's values, and their bits."""
         references = (c.c_uint32 * 1)(variable.reference)
