@@ -1,4 +1,4 @@
-"""Good strangers are sound: the FMI Reference FMUs of a folder that the environment names; none of them is kept here."""
+"""Good strangers are sound: the FMI Reference FMUs of a folder that the environment names; none is kept here."""
 
 import os
 from pathlib import Path
