@@ -180,5 +180,5 @@ def _symbols(
                 f"{name} needs {wanted[0]} and {len(wanted) - 1} more functions of {runtime}: it loads only "
                 "into a process, or "
                 f"on a machine, that has just this {runtime}. Export native code.",
-                "FMI 3.0.2 section 2.5.1.3.1: what is not on a standard machine must be in the FMU",
+                "FMI 2.0.4 section 2.3; FMI 3.0.2 section 2.5.1: external libraries",
             )

@@ -51,7 +51,6 @@ FAULTS = [
     ("SERIALIZE", (3,), "run.serialize"),
     ("ITERATION", (2, 3), "run.iteration"),
     ("NEXT_TIME", (3,), "run.next_time"),
-    ("LAST_TIME", (3,), "run.time"),
     ("PROGRESS", (3,), "run.progress"),
     ("COUNTS", (3,), "run.counts"),
     ("NEEDS_EVENT_MODE", (3,), "run.step"),
@@ -97,6 +96,13 @@ def test_a_finding_of_several_experiments_is_told_once(tmp_path):
     report = check(tmp_path, 3, "UNREADABLE", description=only("CoSimulation", DESCRIPTIONS[3]))
     [finding] = report.findings
     assert "CoSimulation, life cycle (and " in finding.message
+
+
+def test_a_last_successful_time_beside_the_end_of_the_step_is_a_warning(tmp_path):
+    """Without an early return FMI 3.0.2 lets the two differ."""
+    report = check(tmp_path, 3, "LAST_TIME", description=PLAIN)
+    [finding] = report.findings
+    assert (finding.rule, finding.severity) == ("run.time", Severity.WARNING)
 
 
 def test_what_a_crashing_fmu_printed_is_told(tmp_path):
