@@ -91,7 +91,13 @@ class AutomatonSlave(Slave):
 
     def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
         """See `Slave.start`."""
-        run = Execution(self.automaton, t_start=t_start, inputs=Inputs(Layout(self.automaton)), solver=self._solver)
+        run = Execution(
+            self.automaton,
+            t_start=t_start,
+            t_stop=t_stop,
+            inputs=Inputs(Layout(self.automaton)),
+            solver=self._solver,
+        )
         self._block = AutomatonBlock(self.name, run, t_stop, predictable=self._predictable, events=events, keep=False)
         for name, value in self._starts.items():
             self._block.set(name, value)

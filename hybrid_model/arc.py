@@ -39,7 +39,7 @@ class HybridArc:
     message : str
         The particulars of the end, with names and numbers.
     event_tolerance : float
-        Location tolerance of the run in s, see `Solver`.
+        Longest time in s that the run has taken for one instant, see `Solver`.
     automaton : Automaton
         What ran. That of a loaded arc has names, variables and jumps, but no maps.
     """
@@ -47,7 +47,7 @@ class HybridArc:
     def __init__(self, execution: Execution, flows: Sequence[FlowRecord], jumps: list[JumpRecord]) -> None:
         assert execution.stopped is not None
         read = ComputedValues(execution.automaton, execution.inputs)
-        self._fill(read, flows, jumps, execution.stopped, execution.message, execution.solver.event_tolerance)
+        self._fill(read, flows, jumps, execution.stopped, execution.message, execution.event_tolerance)
 
     @classmethod
     def recorded(

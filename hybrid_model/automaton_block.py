@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybrid_model.blocks import Block, Step, Termination, Update
+from hybrid_model.borders import instant
 from hybrid_model.errors import SchedulingError
 from hybrid_model.execution import Execution
 from hybrid_model.lookahead import Lookahead, take_internal
@@ -116,7 +117,7 @@ class AutomatonBlock(Block):
     def step(self, t: float, t_next: float) -> Step:
         """See `Block.step`."""
         run, ahead = self.run, self._ahead
-        if abs(run.t - t) > 1e-12 * max(1.0, abs(t)) or not t_next > t:
+        if abs(run.t - t) > instant(run, t) or not t_next > t:
             raise SchedulingError(
                 f"{self.name} is at t = {run.t:.12g} s and cannot step from {t:.12g} to {t_next:.12g} s."
             )
@@ -128,7 +129,7 @@ class AutomatonBlock(Block):
             self.run = run = ahead.move_to_end(self.recording)
             self._ahead = None
             # The caller may go slightly beyond the event, to where another block's simultaneous event is.
-            if t_next <= run.t + run.solver.event_tolerance:
+            if t_next <= run.t + instant(run, t_next):
                 self.recording.flowed(run.drift(t_next))
         due = self._events and ((ahead is not None and run is ahead.end) or run.due() is not None)
         return Step(run.t, due, termination(run))

@@ -15,7 +15,7 @@ from hybrid_model.variables import Kind, Value, Values, Variable
 
 SINCE, HELD, DWELL = "since_jump", "held_jumps", "minimum_dwell"
 EXPIRED = 1e-9
-"""In s: a jump so soon after the dwell time is over was waiting for it."""
+"""Part of the dwell time: a jump so soon after it is over was waiting for it."""
 
 
 class MinimumDwell(Automaton):
@@ -88,7 +88,7 @@ class MinimumDwell(Automaton):
         new = self.automaton.reset(jump, s)
         if self.jumps[jump].trigger is Trigger.TIME:
             return new
-        waited = np.where(s[SINCE] - s[DWELL] <= EXPIRED, 1.0, 0.0)
+        waited = np.where(s[SINCE] - s[DWELL] <= EXPIRED * s[DWELL], 1.0, 0.0)
         return {**new, SINCE: 0.0, HELD: s[HELD] + waited}
 
     def output_values(self, s: Values) -> Assignments:

@@ -160,7 +160,14 @@ def _blocks(
     for part, automaton in network.parts.items():
         own = {v.name: network.scoped_name(part, v.name) for v in automaton.of_kind(Kind.INPUT, Kind.PARAMETER)}
         given = {name: inputs[scoped] for name, scoped in own.items() if scoped in inputs}
-        run = Execution(automaton, t_start=t_start, inputs=Inputs(Layout(automaton), given), solver=solver, zeno=zeno)
+        run = Execution(
+            automaton,
+            t_start=t_start,
+            t_stop=t_end,
+            inputs=Inputs(Layout(automaton), given),
+            solver=solver,
+            zeno=zeno,
+        )
         _start(run, network.part_values(part, s), given)
         blocks[part] = AutomatonBlock(part, run, t_end)
     return blocks
@@ -195,6 +202,6 @@ def _result(
             recording.jumps,
             stop=stop,
             message=message,
-            event_tolerance=run.solver.event_tolerance,
+            event_tolerance=run.event_tolerance,
         )
     return NetworkRun(arcs, stop, message, t)

@@ -13,19 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid_model.automaton import Automaton
+from hybrid_model.borders import border, leads_out
 from hybrid_model.errors import SimulationError
 from hybrid_model.flow import FlowPiece, integrate, straight_piece
 from hybrid_model.layout import not_finite
-from hybrid_model.locate import ulp
+from hybrid_model.scales import ROUNDINGS, one_instant, ulp
 from hybrid_model.signals import Inputs
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
 from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import FloatArray, Kind, Values
 from hybrid_model.zeno import ZenoGuard, ZenoMonitor
-
-ROUNDING = 8.0
-"""Time events closer than this many ulp differ by rounding: 3 * 0.1 and 0.3 are one time."""
 
 _QUIET = np.errstate(all="ignore")
 """Values that are not finite are found and named by the checks of rule 10, not by numpy's warnings."""
@@ -66,8 +64,8 @@ class Execution:
     ----------
     automaton : Automaton
         What runs.
-    t_start : float
-        Start time in s.
+    t_start, t_stop : float
+        Start time, and the time that maps and inputs are not asked beyond (rule 13), in s.
     inputs : Inputs, optional
         The input vector as a function of time; default: start values.
     solver : Solver
@@ -81,6 +79,10 @@ class Execution:
         Hybrid time.
     x, z, p : ndarray
         Continuous states, discrete states, and parameters as they are at t.
+    t_jump : float
+        Time of the last jump in s; at first the start time.
+    sizes : ndarray
+        Usual size of each continuous state: the nominal value, or the largest that the run has shown.
     guards : int
         Number of jumps on state.
     levels : ndarray
@@ -95,6 +97,7 @@ class Execution:
         automaton: Automaton,
         *,
         t_start: float = 0.0,
+        t_stop: float = math.inf,
         inputs: Inputs | None = None,
         solver: Solver | None = None,
         zeno: ZenoGuard | None = None,
@@ -109,7 +112,8 @@ class Execution:
         self.monitor = ZenoMonitor(zeno or ZenoGuard())
         self._on_state = np.array([info.trigger is Trigger.STATE for info in automaton.jumps], dtype=bool)
         self.guards = int(np.count_nonzero(self._on_state))
-        self.t = float(t_start)
+        self.t = self.t_start = self.t_jump = float(t_start)
+        self.t_stop = float(t_stop)
         self.j = 0
         self.x = self.layout.start(Kind.STATE)
         self.z = self.layout.start(Kind.DISCRETE)
@@ -122,6 +126,11 @@ class Execution:
             [place.variable.integer for place in self.layout.places[Kind.DISCRETE]],
             [place.variable.size for place in self.layout.places[Kind.DISCRETE]],
         ).astype(bool)
+        self.nominal = np.concatenate(
+            [np.full(place.variable.size, place.variable.nominal or np.nan) for place in self.layout.places[Kind.STATE]]
+            or [np.zeros(0)]
+        )
+        self.sizes = np.zeros(self.x.size)
         self.levels = self._zero_levels()
         self.compute_start()
 
@@ -129,6 +138,22 @@ class Execution:
         """Give the computed states their start values, from parameters, inputs and the other states."""
         self.x, self.z = self.maps.start(self.t, self.x, self.z, self.inputs.at(self.t), self.p)
         self._require_finite("at the start")
+        self.sizes = np.where(np.isnan(self.nominal), np.abs(self.x), self.nominal)
+
+    def arrive(self, t: float, x: FloatArray) -> None:
+        """Take another point of the present flow."""
+        self.t, self.x = t, x
+        self.sizes = self.sizes_with(x)
+
+    def sizes_with(self, x: FloatArray) -> FloatArray:
+        """Return the usual sizes of the states if the run also came to `x`."""
+        return np.where(np.isnan(self.nominal), np.maximum(self.sizes, np.abs(x)), self.nominal)
+
+    @property
+    def event_tolerance(self) -> float:
+        """In s: the longest time that this run has taken for one instant, see `Solver.event_tolerance`."""
+        declared = self.solver.event_tolerance
+        return one_instant(self.t, self.t_start, self.t_start) if declared is None else declared
 
     def values(self) -> Values:
         """Return all values at the present hybrid time, by name."""
@@ -181,6 +206,8 @@ class Execution:
         self._require_whole(f"after jump {info.name!r} at t = {self.t:.9g} s")
         record = JumpRecord(self.t, self.j, index, info.name, x, z, self.x, self.z)
         self.j += 1
+        self.t_jump = self.t
+        self.arrive(self.t, self.x)
         self._left_flow_set = False
         on_state = info.trigger is Trigger.STATE
         if on_state:
@@ -197,20 +224,21 @@ class Execution:
         return record
 
     @_QUIET
-    def in_flow_set(self, tolerance: float) -> bool:
-        """Whether the state lies in the flow set, or outside by no more than `tolerance`."""
-        return not self.automaton.has_flow_set or self.flow_margin() >= -tolerance
+    def in_flow_set(self) -> bool:
+        """Whether the state lies in the flow set, or outside by rounding only (rule 3)."""
+        if not self.automaton.has_flow_set:
+            return True
+        margin = self.flow_margin()
+        return margin >= 0.0 or margin >= -border(self, self.t, self.x)
 
     def _flow_is_over(self) -> bool:
         """Whether the state is outside the flow set; on the border, up to rounding, whether the flow leads out."""
         if not self.automaton.has_flow_set:
             return False
         margin = self.flow_margin()
-        tolerance = self.solver.event_tolerance
-        if margin > 0.0 or margin < -tolerance:
-            return margin < 0.0
-        soon = self.t + tolerance
-        return float(self.margins(soon, self.x + tolerance * self.rates_at(self.t, self.x))[-1]) < margin
+        if margin > 0.0:
+            return False
+        return margin < -border(self, self.t, self.x) or leads_out(self)
 
     # Rates, margins and times; the latter two must be numbers (rule 10).
 
@@ -282,7 +310,7 @@ class Execution:
         """
         times = [*map(float, self.event_times()), self.inputs.next_breakpoint(self.t)]
         first = min(times)
-        return max(time for time in times if time <= first + ROUNDING * ulp(first)) if math.isfinite(first) else first
+        return max(time for time in times if time <= first + ROUNDINGS * ulp(first)) if math.isfinite(first) else first
 
     @_QUIET
     def flow(self, limit: float) -> list[FlowPiece]:
@@ -303,22 +331,28 @@ class Execution:
         SimulationError
             If the flow map gives values that are not finite, or the solver cannot go on.
         """
-        if not self.in_flow_set(self.solver.event_tolerance):
+        if not self.in_flow_set():
             self._block("the state is in neither the flow set nor the jump set")
             return []
         self.levels = self._zero_levels()
         pieces, left = integrate(self, limit, self.next_time_event())
         self.tune()
         self._left_flow_set = left
-        tolerance = self.solver.event_tolerance
-        # Under flow priority a state that is outside by rounding flows on while it stays so (rule 3).
-        if left and self.due() is None and not self.flow_margin() > -tolerance:
+        if left and self.due() is None and not self._outside_by_rounding():
             self._block("the flow left the flow set, and the state is not in the jump set")
         return pieces
 
+    def _outside_by_rounding(self) -> bool:
+        """Whether, under flow priority, a state that has left the flow set may flow on (rule 3)."""
+        flow_first = self.automaton.priority is Priority.FLOW
+        return flow_first and self.flow_margin() > -border(self, self.t, self.x)
+
     def move(self, t: float, x: FloatArray, z: FloatArray, j: int) -> None:
         """Move to a point of a flow that a copy of this execution has already flown."""
-        self.t, self.x, self.z, self.j = t, x, z, j
+        if j != self.j:
+            self.t_jump = t
+        self.z, self.j = z, j
+        self.arrive(t, x)
         self.tune()
         self.levels = self._zero_levels()
 
@@ -331,14 +365,14 @@ class Execution:
 
     @_QUIET
     def drift(self, t: float) -> list[FlowPiece]:
-        """Move on by no more than the event tolerance with the present derivative, although a jump is due.
+        """Move on within one instant with the present derivative, although a jump is due.
 
         Simultaneous events of other parts are handled at the latest of their times (rule 6).
         """
         if t <= self.t:
             return []
         piece = straight_piece(self.t, t, self.x, self.x + (t - self.t) * self.rates_at(self.t, self.x))
-        self.t, self.x = piece.t1, piece.x1
+        self.arrive(piece.t1, piece.x1)
         self.tune()
         return [piece]
 

@@ -25,6 +25,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.special import comb
 
+from hybrid_model.scales import ulp
 from hybrid_model.variables import FloatArray
 
 BoolArray = npt.NDArray[np.bool_]
@@ -51,11 +52,6 @@ def _matrices(degree: int) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 POINTS, TO_BERNSTEIN, TO_TAIL = _matrices(DEGREE)
-
-
-def ulp(t: float) -> float:
-    """Return the distance from `t` to the next float."""
-    return float(np.spacing(max(abs(t), 1.0)))
 
 
 def scan_times(a: float, b: float) -> FloatArray:
@@ -105,7 +101,7 @@ def first_rise(times: FloatArray, samples: FloatArray, margin: MarginAtTimes) ->
     halvings = 0
     while True:
         sure, bracket = _judge(times, samples)
-        if not sure and halvings < HALVINGS and times[-1] - times[0] > DEGREE**2 * ulp(times[-1]):
+        if not sure and halvings < HALVINGS and times[-1] - times[0] > DEGREE**2 * max(ulp(times[0]), ulp(times[-1])):
             halvings += 1
             middle = 0.5 * (float(times[0]) + float(times[-1]))
             # The first half is looked at first, so it comes last.
@@ -159,7 +155,8 @@ def first_nonnegative(margin: Margin, a: float, b: float) -> float:
         # Zero counts as above: else a zero at b would end the search, although the margin may be zero or above before.
         return margin(t) or SMALLEST
 
-    t = float(brentq(signed, a, b, xtol=2.0 * ulp(b), rtol=8.9e-16, maxiter=1000))
+    # Absolutely no coarser than the floats at the bracket's start, and relatively to rounding: zero may be close to b.
+    t = float(brentq(signed, a, b, xtol=max(2.0 * ulp(a), SMALLEST), rtol=8.9e-16, maxiter=2000))
     step = ulp(t)
     while margin(t) < 0.0:
         t = min(t + step, b)

@@ -19,9 +19,8 @@ from typing import Protocol
 
 from hybrid_model.blocks import Block, Step, Termination
 from hybrid_model.errors import SchedulingError
+from hybrid_model.scales import one_instant
 
-SIMULTANEOUS = 1e-9
-"""In s: events of different blocks closer than this are handled at one instant, in the order of the blocks."""
 ITERATIONS = 10_000
 """Event iterations of one block at one instant, and steps of it in a row that lead nowhere, at most."""
 
@@ -66,6 +65,7 @@ class _Place:
     block: Block
     order: int
     t: float
+    t_event: float
     next_event: float | None = None
     version: int = 0
     stalls: int = 0
@@ -82,8 +82,9 @@ class Scheduler:
         Name of a block -> the wires that leave it. All carry signals that change only at events.
     t_start : float
         Time in s.
-    tolerance : float
-        In s: events of different blocks closer than this are handled at one instant.
+    tolerance : float, optional
+        In s: events of different blocks closer than this are handled at one instant, in the order of the blocks;
+        default: as the run has it (`hybrid_model.scales`).
 
     Attributes
     ----------
@@ -104,16 +105,16 @@ class Scheduler:
         blocks: Mapping[str, Block],
         wires_from: Callable[[str], Iterable[Wire]],
         t_start: float,
-        tolerance: float = SIMULTANEOUS,
+        tolerance: float | None = None,
     ) -> None:
-        self.t = t_start
+        self.t = self._t_start = t_start
         self.ticks: list[Tick] = []
         self.events: list[Event] = []
         self.steps = 0
         self.ended: tuple[str, float, Termination] | None = None
         self._wires_from = wires_from
         self._tolerance = tolerance
-        self._places = {name: _Place(block, k, t_start) for k, (name, block) in enumerate(blocks.items())}
+        self._places = {name: _Place(block, k, t_start, t_start) for k, (name, block) in enumerate(blocks.items())}
         self._unpredictable: set[str] = set()
         self._queue: list[tuple[float, int, int, str]] = []
 
@@ -200,15 +201,15 @@ class Scheduler:
         place.block.enter_event_mode()
 
     def _require_behind(self, place: _Place, t: float, sender: str) -> None:
-        if place.t > t + self._tolerance:
+        if place.t > t + self._instant(place, t):
             raise SchedulingError(
                 f"{sender} sends to {place.block.name} at t = {t:.12g} s, but {place.block.name} is at "
                 f"{place.t:.12g} s already and cannot return to an earlier state: use the fixed-step master."
             )
 
     def _require_announced(self, place: _Place, t: float) -> None:
-        """Refuse a stop before `t`; within the tolerance before it, it is rounding."""
-        if place.t < t - self._tolerance and not self.ended:
+        """Refuse a stop before `t`; at the same instant, it is rounding."""
+        if place.t < t - self._instant(place, t) and not self.ended:
             raise SchedulingError(
                 f"{place.block.name} stopped at t = {place.t:.12g} s for an event that it had not announced, on the "
                 f"way to {t:.12g} s: its nextEventTime is wrong."
@@ -217,7 +218,7 @@ class Scheduler:
     def _step(self, place: _Place, t: float) -> Step:
         made = place.block.step(place.t, t)
         self.steps += 1
-        if made.reached < place.t or made.reached > t + self._tolerance:
+        if made.reached < place.t or made.reached > t + self._instant(place, t):
             raise SchedulingError(
                 f"{place.block.name} stepped from {place.t:.12g} towards {t:.12g} s and says that it is at "
                 f"{made.reached:.12g} s: that is outside the step."
@@ -241,6 +242,7 @@ class Scheduler:
         place = self._places[name]
         place.block.enter_step_mode()
         place.version += 1
+        place.t_event = place.t
         predicts = place.next_event is not None and place.block.foresees
         (self._unpredictable.discard if predicts else self._unpredictable.add)(name)
         if place.next_event is None:
@@ -259,9 +261,9 @@ class Scheduler:
         stopped = self._watch_unpredictable(first)
         if stopped:
             first = min(place.t for place in stopped)
-        due = {place.block.name for place in stopped if place.t <= first + self._tolerance}
+        due = {place.block.name for place in stopped}
         instant = first
-        while self._queue and self._queue[0][0] <= min(first + self._tolerance, limit):
+        while self._queue and self._queue[0][0] <= min(first + self._instant(self._first_place(), first), limit):
             time, _, _, name = heapq.heappop(self._queue)
             instant = max(instant, time)
             due.add(name)
@@ -274,6 +276,15 @@ class Scheduler:
             if not self.ended:
                 place.block.enter_event_mode()
         return instant, set() if self.ended else due
+
+    def _first_place(self) -> _Place:
+        return self._places[self._queue[0][3]]
+
+    def _instant(self, place: _Place, t: float) -> float:
+        """Return in s how far a block's event may be from `t` and still be of that instant (rule 6)."""
+        if self._tolerance is not None:
+            return self._tolerance
+        return one_instant(t, self._t_start, place.t_event)
 
     def _drop_obsolete(self) -> None:
         while self._queue and self._places[self._queue[0][3]].version != self._queue[0][2]:
@@ -299,7 +310,7 @@ class Scheduler:
                 if self.ended:
                     return []
             for place, t, state in saved:
-                if place.t > first + self._tolerance:
+                if place.t > first + self._instant(place, first):
                     place.block.restore(state)
                     place.t = t
                     self._step(place, first)
@@ -307,6 +318,6 @@ class Scheduler:
             for place, _, state in saved:
                 place.block.release(state)
         for place in stopped:
-            if place.t > first + self._tolerance and not place.block.can_restore:
+            if place.t > first + self._instant(place, first) and not place.block.can_restore:
                 heapq.heappush(self._queue, (place.t, place.order, place.version, place.block.name))
-        return [place for place in stopped if place.t <= first + self._tolerance]
+        return [place for place in stopped if place.t <= first + self._instant(place, first)]

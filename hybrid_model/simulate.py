@@ -72,14 +72,14 @@ def simulate(
             f"the end time is {t_end} s and the start {t_start} s: give a finite end after the start."
         )
     execution = Execution(
-        automaton, t_start=t_start, inputs=Inputs(Layout(automaton), inputs), solver=solver, zeno=zeno
+        automaton, t_start=t_start, t_stop=t_end, inputs=Inputs(Layout(automaton), inputs), solver=solver, zeno=zeno
     )
     recording = Recording(execution)
     while execution.stopped is None:
         index = execution.due()
         if index is not None:
             recording.jumped(execution.jump(index))
-        elif execution.t >= t_end and execution.in_flow_set(execution.solver.event_tolerance):
+        elif execution.t >= t_end and execution.in_flow_set():
             execution.stopped, execution.message = Stop.HORIZON, f"{automaton.name}: reached t = {t_end:.9g} s."
         else:
             recording.flowed(execution.flow(t_end))

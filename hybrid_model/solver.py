@@ -32,15 +32,19 @@ class Solver(ExplainedCall):
     ----------
     method : Method or str
         Stepper, or its name: ``"DOP853"``, ``"RK45"``, and for stiff flows ``"Radau"``, ``"BDF"`` and ``"LSODA"``.
-    rtol, atol : float
-        Relative and absolute tolerance of a step, as in SciPy.
+    rtol : float
+        Relative tolerance of a step, as in SciPy.
+    atol : float, optional
+        Absolute tolerance of a step, as in SciPy; default: 1e-15 of the nominal value where a state has one, else of
+        the largest state of the run so far.
     max_step : float
         Longest step in s.
     scan_points : int
         Samples of every margin in a step, in whole eights; see `hybrid_model.locate` for what that bounds.
-    event_tolerance : float
+    event_tolerance : float, optional
         In s: crossings closer than this are taken at one instant, in the fixed order of the jumps. The same number, in
-        the margin's unit, is how far outside the flow set rounding may leave a state.
+        the margin's unit, is how far outside the flow set rounding may leave a state. Default: both follow from the
+        run (`hybrid_model.scales`), and so do not depend on units.
 
     Raises
     ------
@@ -51,10 +55,10 @@ class Solver(ExplainedCall):
 
     method: Method | str = Method.DOP853
     rtol: float = 1e-13
-    atol: float = 1e-15
+    atol: float | None = None
     max_step: float = math.inf
     scan_points: int = 8
-    event_tolerance: float = 1e-9
+    event_tolerance: float | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.method, Method):
@@ -65,6 +69,8 @@ class Solver(ExplainedCall):
                 raise SimulationError(f"solver option {field.name} = {told(given)}: give a number.")
         for name in ("rtol", "atol", "max_step", "scan_points", "event_tolerance"):
             value = getattr(self, name)
+            if value is None and name in ("atol", "event_tolerance"):
+                continue
             if not value > 0 or (math.isinf(value) and name != "max_step"):
                 raise SimulationError(f"solver option {name} = {value}: give a positive number.")
         if self.scan_points != int(self.scan_points):

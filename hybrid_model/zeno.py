@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybrid_model.errors import SimulationError
-from hybrid_model.locate import ulp
+from hybrid_model.scales import ACCUMULATION, CROWD, RESOLVED, ulp
 
 HISTORY = 12
+SHRINKS = 0.999
+"""Gaps shrink within a crowd if the last is less than this part of the first."""
 GAPS = 8
 """Ratios of successive gaps are compared over this many gaps: enough to tell geometric shrinking from chance."""
-RESOLVED = 1e4
-"""Gaps of fewer ulp than this have ratios that rounding blurs: an accumulation is judged before."""
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,15 @@ class ZenoGuard:
     ----------
     jumps_at_once : int
         More jumps of one name than this at one instant end the run.
-    window : float
-        In s; `jumps_in_window` jumps of one name within it end the run.
+    window : float, optional
+        In s; `jumps_in_window` jumps of one name within it end the run. Default: a millionth of the longest gap so far
+        if gaps still shrink, or gaps that floats at that time do not resolve.
     jumps_in_window : int
         See `window`.
-    remainder : float
+    remainder : float, optional
         In s; jumps whose gaps shrink geometrically end the run when the time left to the accumulation point, by the
-        sum of the geometric series, is below this (or below what floats at that time resolve well enough).
+        sum of the geometric series, is below this (or below what floats at that time resolve well enough). Default:
+        a millionth of the longest of the gaps that shrink.
     spread : float
         Relative spread up to which successive ratios of gaps count as one.
     max_jumps : int
@@ -50,9 +52,9 @@ class ZenoGuard:
     """
 
     jumps_at_once: int = 1000
-    window: float = 1e-6
+    window: float | None = None
     jumps_in_window: int = 100
-    remainder: float = 1e-6
+    remainder: float | None = None
     spread: float = 0.05
     max_jumps: int = 100_000
 
@@ -65,6 +67,8 @@ class ZenoGuard:
             object.__setattr__(self, name, int(count))
         for name in ("window", "remainder", "spread"):
             limit = getattr(self, name)
+            if limit is None and name != "spread":
+                continue
             if not (_finite(limit) and limit >= 0.0):
                 raise SimulationError(f"ZenoGuard option {name} = {limit!r}: give a finite number, 0 or more.")
 
@@ -87,6 +91,8 @@ class ZenoMonitor:
         self._recent: dict[str, deque[float]] = {}
         self._total: dict[str, int] = {}
         self._at_once: dict[str, tuple[float, int]] = {}
+        self._longest: dict[str, float] = {}
+        self._shrinking_from: dict[str, float] = {}
 
     def record(self, automaton: str, jump: str, t: float, *, on_state: bool = True) -> str | None:
         """Count a jump at time `t`.
@@ -125,15 +131,33 @@ class ZenoMonitor:
         if not on_state:
             return None
         recent = self._recent.setdefault(jump, deque(maxlen=max(HISTORY, self.guard.jumps_in_window)))
+        self._measure(jump, recent, t)
         recent.append(t)
         return self._crowded(automaton, jump, recent) or self._geometric(automaton, jump, recent)
 
+    def _measure(self, jump: str, recent: deque[float], t: float) -> None:
+        """Keep the longest gap between jumps of a name, and the first one of those that shrink."""
+        if not recent:
+            return
+        gap = t - recent[-1]
+        before = recent[-1] - recent[-2] if len(recent) > 1 else math.inf
+        self._longest[jump] = max(self._longest.get(jump, 0.0), gap)
+        if not gap < before:
+            self._shrinking_from[jump] = gap
+        self._shrinking_from.setdefault(jump, gap)
+
     def _crowded(self, automaton: str, jump: str, recent: deque[float]) -> str | None:
         n = self.guard.jumps_in_window
-        if len(recent) < n or recent[-1] - recent[-n] > self.guard.window:
-            return None
-        if recent[-1] == recent[-n]:
+        if len(recent) < n or recent[-1] == recent[-n]:
             return None  # a cascade at one instant has its own, larger budget
+        span = recent[-1] - recent[-n]
+        if self.guard.window is not None:
+            crowded = span <= self.guard.window
+        else:
+            shrink = recent[-1] - recent[-2] < SHRINKS * (recent[-n + 1] - recent[-n])
+            crowded = (shrink and span <= CROWD * self._longest[jump]) or span <= n * RESOLVED * ulp(recent[-1])
+        if not crowded:
+            return None
         return (
             f"{automaton}: {n} jumps of {jump!r} in {recent[-1] - recent[-n]:.2g} s around t = {recent[-1]:.12g} s: "
             "jumps accumulate there. End the run before, or give the jump set a minimum dwell time."
@@ -151,7 +175,10 @@ class ZenoMonitor:
         if max(ratios) >= 1.0 or max(ratios) - min(ratios) > self.guard.spread * ratio:
             return None
         left = gaps[-1] * ratio / (1.0 - ratio)
-        if left > max(self.guard.remainder, RESOLVED * ulp(times[-1])):
+        remainder = self.guard.remainder
+        if remainder is None:
+            remainder = ACCUMULATION * self._shrinking_from[jump]
+        if left > max(remainder, RESOLVED * ulp(times[-1])):
             return None
         return (
             f"{automaton}: {self._total[jump]} jumps of {jump!r} accumulate at t = {times[-1] + left:.12g} s (the last "

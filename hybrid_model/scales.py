@@ -1,0 +1,79 @@
+"""The numbers of the semantics, for all executions: none is in seconds or in the unit of a state (rule 12).
+
+A run whose time or whose states are written in another unit is the same run, scaled. So what counts as one instant, as
+a border or as an accumulation is a part of something that the run itself has: its time so far, the gap to its last
+jump, the size of its states, the spacing of floating-point numbers. Exported FMUs carry these numbers in their
+`model.c`, and the scheduler of networks uses the same function of time.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybrid_model.variables import FloatArray
+
+ROUNDINGS = 8.0
+"""Times that differ by fewer ulp are one: 3 * 0.1 and 0.3."""
+INSTANT = 2e-11
+"""Crossings closer than this part of the time since the start are one instant: their times are no more accurate."""
+INSTANT_IN_GAP = 1e-4
+"""But never further apart than this part of the time since the last jump: fast events late in a run stay apart."""
+BORDER = 1e-9
+"""A state is on the border of a set if it is across by less than moving the states by this part of their size does."""
+NOISE = 1e-15
+"""The same, where only rounding is meant: under flow priority a flow set is left beyond it."""
+ABSOLUTE = 1e-15
+"""Absolute tolerance of a step, as a part of the size of the states."""
+PROBE = 1e-6
+"""Where a flow leads from a border is looked at after this part of a step of the solver."""
+OVERSHOOT = 1000.0
+"""In ulp: so far before a guard a solver may get stuck if the flow map cannot be evaluated behind it."""
+ACCUMULATION = 1e-6
+"""Jumps accumulate if what is left of the geometric series of their gaps is below this part of its longest gap."""
+CROWD = 1e-6
+"""Jumps crowd if many of them, at shrinking gaps, come within this part of the longest gap."""
+RESOLVED = 1e4
+"""In ulp: gaps below have ratios that rounding blurs; jumps at such gaps are an accumulation."""
+
+
+def ulp(t: float) -> float:
+    """Return the distance from the size of `t` to the next larger float."""
+    return math.ulp(t)
+
+
+def one_instant(t: float, t_start: float, t_last: float) -> float:
+    """Return how far apart two crossings may be at `t` and still be one instant (rule 6).
+
+    Parameters
+    ----------
+    t : float
+        Time of the first of them in s.
+    t_start, t_last : float
+        Start of the run and time of the last jump before, in s.
+
+    Returns
+    -------
+    float
+        In s.
+    """
+    return max(ROUNDINGS * ulp(t), min(INSTANT * (t - t_start), INSTANT_IN_GAP * (t - t_last)))
+
+
+def moves(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return two ways to move states by up to `BORDER` of their sizes; no simple sum of states hides from both.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (n,)
+        Usual sizes of the states.
+
+    Returns
+    -------
+    (ndarray, ndarray)
+        Changes of the states, shape (n,) each.
+    """
+    k = np.arange(len(sizes))
+    weights = 1.0 - 0.5 * np.mod(k * 0.6180339887498949, 1.0)
+    return BORDER * sizes * weights, BORDER * sizes * weights * np.where(k % 2 == 0, 1.0, -1.0)
