@@ -10,6 +10,7 @@ from fmu.names import NameTable
 from fmu.network import NetworkTrace
 from fmu.trace import Trace
 from fmu.variables import FmuVariable
+from hybrid_model import scales
 from hybrid_model.layout import Layout
 from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import Kind
@@ -55,6 +56,11 @@ _MAPS = (
     *("start", "flow", "flow_set", "margins", "times", "outputs", "reset"),
     *("forward", "reverse", "start_forward", "start_reverse"),
 )
+_SCALES = (
+    *("roundings", "instant", "instant_in_gap", "border", "noise", "absolute", "probe", "overshoot"),
+    *("accumulation", "crowd", "resolved"),
+)
+"""As `ModelScales` has them; the numbers are those of `hybrid_model.scales`."""
 _PRELUDE = """\
 /* Generated from an automaton.  Its names stay inside, and its maps need not use all that they are given. */
 #include <math.h>
@@ -89,9 +95,9 @@ def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> l
 
 
 def _nominals(layout: Layout) -> list[float]:
-    """Return a usual size of each continuous state, 1 where none is declared."""
+    """Return a usual size of each continuous state, 0 where none is declared."""
     variables = [place.variable for place in layout.places[Kind.STATE]]
-    return [1.0 if v.nominal is None else v.nominal for v in variables for _ in range(v.size)]
+    return [0.0 if v.nominal is None else v.nominal for v in variables for _ in range(v.size)]
 
 
 def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
@@ -139,6 +145,7 @@ def _model(
         "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
         **{name: f"hybrid_{name}" for name in _MAPS},
+        "scales": row(*(constant(getattr(scales, name.upper())) for name in _SCALES)),
         **{name: name for name in ("nominals", "jumps", "clock_jump", "variables")},
         **{name: name for name in ("state_names", "discrete_names", "margin_names", "names")},
     }

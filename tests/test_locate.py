@@ -25,9 +25,9 @@ def first_rise(margin, a, b, panels=1):
     return None
 
 
-def test_ulp_is_the_distance_of_floats_and_not_smaller_than_at_one():
-    assert ulp(0.0) == ulp(1.0) == np.spacing(1.0)
-    assert ulp(-1e6) == ulp(1e6) == np.spacing(1e6)
+def test_ulp_is_the_distance_of_floats_at_any_size():
+    for t in (0.0, 1e-300, 1e-9, 1.0, 1e6):
+        assert ulp(-t) == ulp(t) == np.spacing(t)
 
 
 def test_scan_times_hold_the_ends_and_do_not_fall():

@@ -89,13 +89,18 @@ static void *take(Cursor *cursor, size_t size)
     return place;
 }
 
+static size_t point_length(const Model *m)
+{
+    return 2 + m->n_states + m->n_discrete + m->n_margins + 1 + m->n_states;
+}
+
 static Point take_point(Cursor *cursor, const Model *m)
 {
-    double *values = take(cursor, (2 + m->n_states + m->n_discrete + m->n_margins + 1) * sizeof(double));
+    double *values = take(cursor, point_length(m) * sizeof(double));
     if (!values)
-        return (Point){NULL, NULL, NULL, NULL, NULL};
-    double *x = values + 2, *z = x + m->n_states;
-    return (Point){values, values + 1, x, z, z + m->n_discrete};
+        return (Point){NULL, NULL, NULL, NULL, NULL, NULL};
+    double *x = values + 2, *z = x + m->n_states, *level = z + m->n_discrete;
+    return (Point){values, values + 1, x, z, level, level + m->n_margins + 1};
 }
 
 /* Lays out the block; called once with no memory, to learn the size. */
@@ -199,8 +204,7 @@ void copy_values(double *to, const double *from, size_t n)
 
 void copy_point(const Engine *engine, const Point *from, const Point *to)
 {
-    const Model *m = engine->model;
-    copy_values(to->time, from->time, 2 + m->n_states + m->n_discrete + m->n_margins + 1);
+    copy_values(to->time, from->time, point_length(engine->model));
 }
 
 void engine_reset(Engine *engine)
@@ -208,7 +212,7 @@ void engine_reset(Engine *engine)
     const Model *m = engine->model;
     memset(engine->block, 0, engine->block_size);
     engine->status->relative_tolerance = RELATIVE_TOLERANCE;
-    engine->status->absolute_tolerance = ABSOLUTE_TOLERANCE;
+    engine->status->stop_time = INFINITY;
     copy_values(engine->live.x, m->x, m->n_states);
     copy_values(engine->live.z, m->z, m->n_discrete);
     copy_values(engine->u, m->u, m->n_inputs);
@@ -254,7 +258,7 @@ static bool point_is_sound(const Model *m, const Point *point)
     bool sound = all_finite(point->time, 2 + m->n_states + m->n_discrete) && *point->step >= 0.0;
     for (size_t i = 0; i <= m->n_margins; i++)
         sound = sound && !isnan(point->level[i]);
-    return sound;
+    return sound && all_finite(point->size, m->n_states);
 }
 
 static bool segment_is_sound(const Engine *engine)
@@ -277,7 +281,8 @@ bool engine_block_is_sound(const Engine *engine, void *block)
                  status->prediction >= PREDICTION_NONE && status->prediction <= PREDICTION_QUIET &&
                  memchr(status->message, '\0', sizeof status->message) != NULL &&
                  status->relative_tolerance >= RELATIVE_TOLERANCE &&
-                 status->relative_tolerance <= RELATIVE_TOLERANCE_MOST && status->absolute_tolerance > 0.0;
+                 status->relative_tolerance <= RELATIVE_TOLERANCE_MOST && isfinite(status->start_time) &&
+                 !isnan(status->stop_time) && isfinite(status->jumps_time);
     for (size_t j = 0; j < m->n_jumps; j++)
         sound = sound && other.history[j].stored <= N_ZENO_TIMES;
     return sound && point_is_sound(m, &other.live) && point_is_sound(m, &other.predicted) &&

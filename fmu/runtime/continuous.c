@@ -73,7 +73,7 @@ Answer instance_nominals(void *handle, const char *function, double values[], si
     if (!instance || check_length(instance, function, values, n, model.n_states) != ANSWER_OK)
         return ANSWER_ERROR;
     for (size_t i = 0; i < n; i++)
-        values[i] = model.nominals[i];
+        values[i] = model.nominals[i] > 0.0 ? model.nominals[i] : 1.0;
     return ANSWER_OK;
 }
 

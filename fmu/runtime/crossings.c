@@ -9,8 +9,21 @@
 
 #include "search.h"
 
-/* First move (s) of a bracket's end where the interpolation and the step disagree. */
-#define FIRST_STRIDE 1e-12
+/* First move of a bracket's end where the interpolation and the step disagree, as a part of the step. */
+#define FIRST_STRIDE 1e-11
+
+/* Where a state is no number, that is the flow map's fault and not a margin's. */
+static bool states_are_finite(Engine *engine, double t, const double *x)
+{
+    const Model *m = engine->model;
+    for (size_t i = 0; i < m->n_states; i++)
+        if (!isfinite(x[i]))
+            return problem(engine, ENDED_NOT_FINITE,
+                           "'%s' does not stay finite up to t = %.17g. Remedy: check its derivative for 0/0 or the root "
+                           "of a negative number; trial steps look a little outside the flow set.",
+                           NAME_AT(m, m->state_names[i]), t);
+    return true;
+}
 
 bool look(Search *search, Path path, double t, double *rows)
 {
@@ -25,7 +38,7 @@ bool look(Search *search, Path path, double t, double *rows)
         step_dense(engine, t);
     else if (!step_probe(engine, search->point, t))
         return !(search->failed = true);
-    if (!evaluate_margins(engine, t, x, search->point->z))
+    if (!states_are_finite(engine, t, x) || !evaluate_margins(engine, t, x, search->point->z))
         return !(search->failed = true);
     for (size_t i = 0; i < m->n_margins; i++)
         rows[i] = engine->margins[i];
@@ -40,6 +53,13 @@ bool look(Search *search, Path path, double t, double *rows)
     return true;
 }
 
+bool try_to_look(Search *search, Path path, double t, double *rows)
+{
+    bool seen = look(search, path, t, rows);
+    search->failed = false;
+    return seen;
+}
+
 double look_at(Search *search, Path path, double t, size_t row)
 {
     double *rows = search->engine->samples + N_SAMPLES * search->n_rows;
@@ -51,8 +71,11 @@ double look_at(Search *search, Path path, double t, size_t row)
 void polish(Search *search, size_t row, Bracket *bracket)
 {
     double a = bracket->a, fa = bracket->value_a, b = bracket->b, fb = bracket->value_b, fraction = 0.5;
-    double width = fmax(LOCATION_TOLERANCE, 2.0 * time_ulp(b));
-    for (int i = 0; i < 200 && b - a > width && fb != 0.0 && !search->failed; i++) {
+    for (int i = 0; i < 200 && fb != 0.0 && !search->failed; i++) {
+        /* Zero may lie between: the floats at the nearer end do not decide alone. */
+        double width = 2.0 * fmax(time_ulp(a), time_ulp(b));
+        if (b - a <= width)
+            break;
         double t = a + fraction * (b - a);
         if (t <= a || t >= b)
             break;
@@ -89,7 +112,7 @@ double sample(const Search *search, size_t i, size_t row)
 static bool confirm(Search *search, size_t row, Bracket *bracket)
 {
     const Step *step = &search->engine->step;
-    double a = bracket->a, b = bracket->b, stride = fmax(FIRST_STRIDE, 4.0 * time_ulp(b));
+    double a = bracket->a, b = bracket->b, stride = fmax(FIRST_STRIDE * (step->t1 - step->t0), 4.0 * time_ulp(b));
     double fa = look_at(search, ON_STEP, a, row), fb = look_at(search, ON_STEP, b, row);
     for (; fa >= 0.0 && !search->failed; stride *= 2.0) {
         b = a, fb = fa;
@@ -149,12 +172,32 @@ static bool exit_beyond(Search *search, double beyond, Bracket bracket, double *
     return found && !search->failed;
 }
 
+double last_inside(Search *search, double t)
+{
+    Rises rises;
+    Bracket next, bracket = {.b = -INFINITY};
+    begin_rises(&rises, search, search->exit_row, 0.0);
+    while (next_rise(&rises, t, &next) && next.a < t)
+        bracket = next;
+    if (search->failed || !isfinite(bracket.b))
+        return -INFINITY;
+    if (!confirm(search, search->exit_row, &bracket))
+        return (double)NAN;
+    polish(search, search->exit_row, &bracket);
+    return bracket.b;
+}
+
 bool first_exit(Search *search, double *t)
 {
-    double beyond = search->level < -EVENT_TOLERANCE ? EVENT_TOLERANCE : EVENT_TOLERANCE + search->level;
+    const Step *step = &search->engine->step;
     Rises rises;
-    Bracket far, next, bracket = {.b = -INFINITY};
-    *t = search->engine->step.t0;
+    Bracket far;
+    begin_rises(&rises, search, search->exit_row, 0.0);
+    if (sample(search, 0, search->exit_row) <= 0.0 && !next_rise(&rises, INFINITY, &far))
+        return false;
+    double border = flow_border(search->engine, search->point, step->t1, step->x1);
+    double beyond = search->level < -border ? border : border + search->level;
+    *t = step->t0;
     if (sample(search, 0, search->exit_row) > beyond)
         return true;
     begin_rises(&rises, search, search->exit_row, beyond);
@@ -163,14 +206,7 @@ bool first_exit(Search *search, double *t)
     if (!search->engine->model->flow_priority)
         return exit_beyond(search, beyond, far, t);
     /* Back to the crossing that leads there; those before it came back inside. */
-    begin_rises(&rises, search, search->exit_row, 0.0);
-    while (next_rise(&rises, far.b, &next) && next.a < far.b)
-        bracket = next;
-    if (search->failed || !isfinite(bracket.b))
-        return !search->failed;
-    if (!confirm(search, search->exit_row, &bracket))
-        return false;
-    polish(search, search->exit_row, &bracket);
-    *t = bracket.b;
-    return !search->failed;
+    double crossing = last_inside(search, far.b);
+    *t = isfinite(crossing) ? crossing : step->t0;
+    return !search->failed && !isnan(crossing);
 }

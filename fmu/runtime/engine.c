@@ -1,6 +1,7 @@
 /* The engine proper: the flow through time events, prediction, and advancing to a target. */
 #include "engine.h"
 
+#include <float.h>
 #include <math.h>
 
 #include "parts.h"
@@ -19,7 +20,7 @@ static double next_time(Engine *engine, const Point *point, bool visible, bool i
                 continue;
             if (round == 0)
                 first = fmin(first, time);
-            else if (time <= first + TIME_ROUNDING_ULPS * time_ulp(first))
+            else if (time <= first + m->scales.roundings * time_ulp(first))
                 next = fmax(next, time);
         }
     return isfinite(next) ? next : first;
@@ -37,8 +38,8 @@ static bool go_on(Engine *engine)
 }
 
 /* Flows to `limit` or to the end of a piece without time events, or to the first guard crossing on it.
-   Guards that are simultaneous with one before the limit may put the event beyond it, within the
-   event tolerance, but never beyond the piece. */
+   Guards that are simultaneous with one before the limit may put the event beyond it, within one
+   instant, but never beyond the piece. */
 static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, double piece_end, bool locate,
                           size_t *budget)
 {
@@ -51,8 +52,10 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
         if (*budget == 0)
             return FLOW_BUDGET;
         --*budget;
-        if (!step_accept(engine, point, end))
-            return FLOW_PROBLEM;
+        if (!step_accept(engine, point, end)) {
+            bool reached = locate && engine->problem == ENDED_NOT_FINITE && reach_guard(engine, point, end);
+            return reached ? FLOW_EVENT : FLOW_PROBLEM;
+        }
         if (locate) {
             FlowEnd found = locate_event(engine, point, level, piece_end);
             if (found != FLOW_REACHED)
@@ -67,7 +70,7 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
     return FLOW_REACHED;
 }
 
-/* Takes a guard that is crossed within the tolerance before a time event to that event's instant, where
+/* Takes a guard that is crossed within one instant before a time event to that event's instant, where
    the order of the table decides and not rounding. */
 static FlowEnd go_on_to(Engine *engine, const Point *point, double time_event, size_t *budget)
 {
@@ -99,7 +102,7 @@ static FlowEnd flow(Engine *engine, const Point *point, double limit, bool locat
             return FLOW_REACHED;
         double piece_end = next_time(engine, point, locate, true);
         FlowEnd result = flow_piece(engine, point, limit, piece_end, locate, budget);
-        bool near = piece_end <= limit && piece_end - *point->time <= event_tolerance(piece_end);
+        bool near = piece_end <= limit && piece_end - *point->time <= one_instant(engine, piece_end);
         if (result == FLOW_EVENT && near && *point->time < piece_end)
             result = go_on_to(engine, point, piece_end, budget);
         /* At an event the loop begins anew: a breakpoint of the same instant may come before it. */
@@ -124,14 +127,30 @@ static size_t look_ahead_steps(const Model *m)
     return steps > LOOK_AHEAD_STEPS ? LOOK_AHEAD_STEPS : steps < LEAST_STEPS_AHEAD ? LEAST_STEPS_AHEAD : steps;
 }
 
+/* How far a look ahead goes that has no limit: far beyond all that the run has shown of its time scale. */
+static double look_ahead_limit(Engine *engine)
+{
+    double step, now = *engine->live.time, span = fabs(now);
+    if (step_begin(engine, &engine->live) && first_step(engine, &engine->live, INFINITY, &step))
+        span = fmax(span, step);
+    span *= LOOK_AHEAD_TIMES;
+    if (evaluate_times(engine, &engine->live)) {
+        double next = next_time(engine, &engine->live, true, true);
+        span = isfinite(next) ? fmax(span, LOOK_AHEAD_EVENTS * (next - now)) : span;
+    }
+    /* Nothing is known of a run at rest. */
+    return now + (span > LOOK_AHEAD_TIMES * DBL_MIN ? span : LOOK_AHEAD_TIMES);
+}
+
 bool engine_predict(Engine *engine, double limit, double *event_time)
 {
     Status *status = engine->status;
-    double now = *engine->live.time, horizon = now + LOOK_AHEAD_TIME * fmax(1.0, fabs(now));
+    double now = *engine->live.time;
     size_t budget = look_ahead_steps(engine->model);
     status->prediction = PREDICTION_NONE;
     if (status->ending != ENDED_NOT)
         return false;
+    double horizon = isfinite(limit) ? limit : look_ahead_limit(engine);
     copy_point(engine, &engine->live, &engine->predicted);
     FlowEnd end = flow(engine, &engine->predicted, fmin(limit, horizon), true, &budget);
     bool renew = end == FLOW_BUDGET || (end == FLOW_REACHED && limit > horizon);
@@ -158,7 +177,7 @@ bool engine_arrive(Engine *engine)
     if (!evaluate_times(engine, &engine->live))
         return false;
     next = next_time(engine, &engine->live, true, true);
-    if (next - *now <= TIME_ROUNDING_ULPS * time_ulp(next))
+    if (next - *now <= engine->model->scales.roundings * time_ulp(next))
         *now = next;
     return raise_levels_here(engine, &engine->live);
 }
@@ -166,19 +185,19 @@ bool engine_arrive(Engine *engine)
 bool engine_may_flow(Engine *engine)
 {
     const Point *live = &engine->live;
-    double margin, later, soon = *live->time + fmax(LEAVING_TIME, event_tolerance(*live->time));
+    double margin;
+    bool out;
     if (engine->status->ending != ENDED_NOT)
         return false;
     if (!engine->model->has_flow_set)
         return true;
     if (!evaluate_flow_set(engine, *live->time, live->x, live->z, &margin))
         return end_run(engine);
-    if (margin >= -EVENT_TOLERANCE)
+    if (margin >= 0.0 || margin >= -flow_border(engine, live, *live->time, live->x))
         return true;
-    if (!step_begin(engine, live) || !step_probe(engine, live, soon) ||
-        !evaluate_flow_set(engine, soon, engine->probe_x, live->z, &later))
+    if (!step_begin(engine, live) || !leads_out(engine, live, margin, &out))
         return end_run(engine);
-    if (later >= margin - LEAVING_RATE * LEAVING_TIME)
+    if (!out)
         return true;
     blocked(engine, *live->time, live->x, live->z, margin);
     return end_run(engine);
@@ -194,7 +213,7 @@ static bool breakpoint_until(const Engine *engine, double target)
     return false;
 }
 
-/* The target lies a rounding or less than the tolerance behind the event: go there if the event is
+/* The target lies a rounding or less than an instant behind the event: go there if the event is
    still due then and no breakpoint lies between; otherwise the point stays at the event. */
 static void flow_past_event(Engine *engine, double target)
 {
@@ -240,7 +259,7 @@ static bool reached_with(Engine *engine, EventPolicy policy, double event)
 {
     bool inside = policy == EVENTS_INSIDE || policy == EVENTS_STOP_AFTER;
     return inside && engine->status->prediction == PREDICTION_EVENT &&
-           engine->target >= event - event_tolerance(event) && evaluate_times(engine, &engine->live) &&
+           engine->target >= event - one_instant(engine, event) && evaluate_times(engine, &engine->live) &&
            next_time(engine, &engine->live, true, false) > event;
 }
 
@@ -290,7 +309,7 @@ static Advance advance_locating(Engine *engine, double start, EventPolicy policy
         /* A jump of its own is no surprise. */
         engine->status->settled = true;
         double now = *engine->live.time;
-        if (policy == EVENTS_STOP_AFTER && now > start && engine->target - now > event_tolerance(now))
+        if (policy == EVENTS_STOP_AFTER && now > start && engine->target - now > one_instant(engine, now))
             return ADVANCE_EVENT_BEFORE;
     }
 }
@@ -301,7 +320,8 @@ static void look_ahead(Engine *engine)
     Status *status = engine->status;
     double event, now = *engine->live.time;
     if (status->settled && status->prediction == PREDICTION_NONE && engine->model->predictable && !engine->hook) {
-        engine_predict(engine, now + STEPS_AHEAD * (engine->target - now), &event);
+        double limit = now + STEPS_AHEAD * (engine->target - now);
+        engine_predict(engine, fmin(limit, fmax(status->stop_time, engine->target)), &event);
         /* Nobody has been told to come back where the budget ended: up to there it is quiet. */
         if (status->prediction == PREDICTION_RENEWAL)
             status->prediction = PREDICTION_QUIET;
@@ -357,7 +377,7 @@ Advance engine_advance(Engine *engine, double target, EventPolicy policy)
     }
     if (progress == AT_PREDICTED_EVENT && (policy == EVENTS_STOP || policy == EVENTS_INSIDE_BEFORE_END)) {
         double event = *engine->live.time;
-        bool at_target = target <= event + event_tolerance(event);
+        bool at_target = target <= event + one_instant(engine, event);
         if (at_target && target > event)
             flow_past_event(engine, target);
         if (at_target)

@@ -77,6 +77,8 @@ void engine_set_tolerance(Engine *engine, double relative);
 void engine_set_hook(Engine *engine, StepHook hook, void *context);
 void engine_set_jump_hook(Engine *engine, JumpHook hook, void *context);
 void engine_set_time(Engine *engine, double t);
+/* The times (s) between which maps are evaluated; the present time becomes the start. */
+void engine_set_span(Engine *engine, double start, double stop);
 double engine_time(const Engine *engine);
 /* Writes a value of BANK_STATE, BANK_DISCRETE, BANK_INPUT or BANK_PARAMETER.  A changed value
    makes a prediction invalid. */

@@ -3,6 +3,7 @@
    J. R. Dormand, P. J. Prince, "A family of embedded Runge-Kutta formulae", 1980; starting step and
    interpolation after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential
    Equations I", sections II.4 and II.6. */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -25,6 +26,12 @@ static const double DENSE_WEIGHT[N_STAGES] = {-12715105075.0 / 11282082432.0, 0.
                                               87487479700.0 / 32700410799.0,  -10690763975.0 / 1880347072.0,
                                               701980252875.0 / 199316789632.0, -1453857185.0 / 822651844.0,
                                               69997945.0 / 29380423.0};
+
+/* Of the starting step; see hybrid_model/first_step.py. */
+#define ORDER 5.0
+#define EULER_PART 0.01
+#define BLIND_PART 1e-3
+#define FIRST_GROWTH 100.0
 
 double time_ulp(double t)
 {
@@ -70,9 +77,23 @@ static bool stages(Engine *engine, const double *z, double t0, double t1, const 
     return true;
 }
 
-static double scale(const Engine *engine, double size)
+/* The absolute part follows from the nominal value, or from the largest state so far: of a state that is zero up to
+   rounding no digit is to be had. */
+static double scale(const Engine *engine, size_t i, double size)
 {
-    return engine->status->absolute_tolerance + engine->status->relative_tolerance * size;
+    const Status *status = engine->status;
+    double nominal = engine->model->nominals[i], looser = status->relative_tolerance / RELATIVE_TOLERANCE;
+    double usual = nominal > 0.0 ? nominal : engine->largest;
+    return engine->model->scales.absolute * looser * usual + status->relative_tolerance * size;
+}
+
+/* The largest state that the run has shown at the point, and at x. */
+static double largest_state(const Engine *engine, const Point *point, const double *x)
+{
+    double largest = DBL_MIN / engine->model->scales.absolute;
+    for (size_t i = 0; i < engine->model->n_states; i++)
+        largest = fmax(largest, state_size(engine, point, i, x[i]));
+    return largest;
 }
 
 /* The error of the step in units of the tolerance, infinite if anything is not finite. */
@@ -83,7 +104,7 @@ static double step_error(Engine *engine, const Step *step, double h)
         double sum = 0.0;
         for (size_t s = 0; s < N_STAGES; s++)
             sum += ERROR_WEIGHT[s] * step->k[s][i];
-        double error = fabs(h * sum) / scale(engine, fmax(fabs(step->x0[i]), fabs(step->x1[i])));
+        double error = fabs(h * sum) / scale(engine, i, fmax(fabs(step->x0[i]), fabs(step->x1[i])));
         if (!isfinite(error) || !isfinite(step->x1[i])) {
             engine->suspect = i;
             return INFINITY;
@@ -96,35 +117,43 @@ static double step_error(Engine *engine, const Step *step, double h)
     return worst;
 }
 
-/* The largest component in units of the tolerance at x0. */
-static double size_in_tolerances(const Engine *engine, const double *x0, const double *values, const double *minus)
+/* The largest element of a vector, or of its difference from another one. */
+static double largest_of(size_t n, const double *values, const double *minus)
 {
-    double worst = 0.0;
-    for (size_t i = 0; i < engine->model->n_states; i++) {
-        double value = minus ? values[i] - minus[i] : values[i];
-        worst = fmax(worst, fabs(value) / scale(engine, fabs(x0[i])));
+    double largest = 0.0;
+    for (size_t i = 0; i < n; i++) {
+        double value = fabs(minus ? values[i] - minus[i] : values[i]);
+        /* Not fmax: it passes over what is not a number. */
+        largest = value <= largest ? largest : value;
     }
-    return worst;
+    return largest;
 }
 
-/* A first step from the sizes of the state and of its first two derivatives. */
-static bool starting_step(Engine *engine, const Point *point, double *h)
+/* An Euler step shows how the derivative changes; the step is chosen so that its error is about the tolerance.  Only
+   ratios occur, so that no unit matters: see hybrid_model/first_step.py. */
+bool first_step(Engine *engine, const Point *point, double limit, double *h)
 {
     Step *step = &engine->step;
-    double t = *point->time;
-    double d0 = size_in_tolerances(engine, point->x, point->x, NULL);
-    double d1 = size_in_tolerances(engine, point->x, step->k[0], NULL);
-    double first = d0 < 1e-5 || d1 < 1e-5 ? 1e-6 : 0.01 * d0 / d1;
-    first = fmax(first, 64.0 * time_ulp(t));
-    for (size_t i = 0; i < engine->model->n_states; i++)
-        step->x1[i] = point->x[i] + first * step->k[0][i];
-    if (!derivative(engine, t + first, step->x1, point->z, step->k[1]))
+    size_t n = engine->model->n_states;
+    double t = *point->time, whole = limit - t, speed = largest_of(n, step->k[0], NULL);
+    double size = n > 0 ? largest_state(engine, point, point->x) : 0.0;
+    bool known = size > DBL_MIN / engine->model->scales.absolute;
+    double least = fmin(whole, 64.0 * fmax(time_ulp(t), isfinite(limit) ? time_ulp(limit) : 0.0));
+    double euler = speed > 0.0 && known ? EULER_PART * size / speed : BLIND_PART * whole;
+    *h = euler = isfinite(euler) ? fmax(least, fmin(euler, whole)) : least;
+    if (!(speed > 0.0) || !isfinite(speed))
+        return true;
+    for (size_t i = 0; i < n; i++)
+        step->x1[i] = point->x[i] + euler * step->k[0][i];
+    if (!derivative(engine, t + euler, step->x1, point->z, step->k[1]))
         return false;
-    double d2 = size_in_tolerances(engine, point->x, step->k[1], step->k[0]) / first;
-    double steepest = fmax(d1, d2);
-    double second = steepest <= 1e-15 ? 1e-3 : pow(0.01 / steepest, 0.2);
-    *h = isfinite(second) ? fmin(100.0 * first, second) : first;
-    *h = fmax(*h, 64.0 * time_ulp(t));
+    double turned = largest_of(n, step->k[1], step->k[0]) / (speed * euler);
+    if (!isfinite(turned))
+        return true;
+    double reach = fmax(known ? size : 0.0, speed * euler);
+    double allowed = EULER_PART * engine->status->relative_tolerance * reach / speed;
+    double chosen = turned > 0.0 ? pow(allowed / pow(turned, ORDER), 1.0 / (ORDER + 1.0)) : (double)INFINITY;
+    *h = fmax(least, fmin(fmin(FIRST_GROWTH * euler, chosen), whole));
     return true;
 }
 
@@ -180,7 +209,7 @@ bool step_accept(Engine *engine, const Point *point, double limit)
     Step *step = &engine->step;
     double t0 = *point->time, remaining = limit - t0, h = *point->step;
     bool rejected = false;
-    if (h <= 0.0 && !starting_step(engine, point, &h))
+    if (h <= 0.0 && !first_step(engine, point, limit, &h))
         return false;
     for (;;) {
         /* The last two steps share what remains, so that no sliver is left. */
@@ -191,6 +220,7 @@ bool step_accept(Engine *engine, const Point *point, double limit)
         if (!stages(engine, point->z, t0, step->t1, step->x0, step->k, step->x1) ||
             !derivative(engine, step->t1, step->x1, point->z, step->k[N_STAGES - 1]))
             return false;
+        engine->largest = largest_state(engine, point, step->x1);
         double error = step_error(engine, step, used);
         if (error <= 1.0) {
             *point->step = next_step(h, used, error, rejected);
@@ -210,6 +240,7 @@ void step_commit(Engine *engine, const Point *point)
     double *last = step->k[N_STAGES - 1];
     *point->time = step->t1;
     memcpy(point->x, step->x1, engine->model->n_states * sizeof(double));
+    note_sizes(engine, point);
     /* The last stage is the first one of the next step. */
     step->k[N_STAGES - 1] = step->k[0];
     step->k[0] = last;
@@ -263,6 +294,7 @@ void segment_read(Engine *engine, double t)
     *engine->live.time = t;
     for (size_t i = 0; i < engine->model->n_states; i++)
         engine->live.x[i] = of[0][i] + a * (of[1][i] + b * (of[2][i] + a * (of[3][i] + b * of[4][i])));
+    note_sizes(engine, &engine->live);
 }
 
 void step_dense(Engine *engine, double t)

@@ -40,6 +40,7 @@ bool accept_state(Engine *engine, size_t jump, const Point *point)
         if (!isfinite(engine->reset.x[i]))
             return not_finite(engine, jump, i, *point->time);
     copy_values(point->x, engine->reset.x, m->n_states + m->n_discrete);
+    note_sizes(engine, point);
     *point->step = 0.0;
     return true;
 }
@@ -133,21 +134,17 @@ bool take_internal_jumps(Engine *engine, const Point *point)
    the flow leaves it at once. */
 static bool flow_is_over(Engine *engine, const Point *point, bool *over)
 {
-    double margin, later, soon = *point->time + event_tolerance(*point->time);
+    double margin;
     *over = false;
     if (!engine->model->has_flow_set)
         return true;
     if (!evaluate_flow_set(engine, *point->time, point->x, point->z, &margin))
         return false;
-    *over = margin < -EVENT_TOLERANCE;
-    /* On the border, up to rounding, it depends on where the flow leads. */
-    if (*over || margin > point->level[engine->model->n_margins])
+    if (margin > point->level[engine->model->n_margins])
         return true;
-    if (!step_begin(engine, point) || !step_probe(engine, point, soon) ||
-        !evaluate_flow_set(engine, soon, engine->probe_x, point->z, &later))
-        return false;
-    *over = later < margin;
-    return true;
+    *over = margin < -flow_border(engine, point, *point->time, point->x);
+    /* On the border, up to rounding, it depends on where the flow leads. */
+    return *over || (step_begin(engine, point) && leads_out(engine, point, margin, over));
 }
 
 /* The first enabled visible jump at the point, n_jumps if there is none. */

@@ -1,21 +1,22 @@
 /* The event that ends a flow on one step of the solver.
 
    A guard is crossed on (t0, t1] when its margin goes from negative to zero or above.  Crossings
-   closer than the event tolerance are one instant, the latest of them; a flow that ends shortly before
+   close enough are one instant, the latest of them; a flow that ends shortly before
    a crossing counts as having reached it. */
 #include <math.h>
 
 #include "search.h"
 
-/* The time within the event tolerance after `from` at which guards that are negative there cross, the
+/* The time within one instant after `from` at which guards that are negative there cross, the
    first or the last of them.  `from` itself if there is none. */
 static double crossing_soon_after(Search *search, double from, bool want_first)
 {
     Engine *engine = search->engine;
     const Model *m = engine->model;
-    double until = fmin(from + event_tolerance(from), search->piece_end), chosen = from;
+    double end = fmin(search->piece_end, engine->status->stop_time);
+    double until = fmin(from + one_instant(engine, from), end), chosen = from;
     double *now = engine->samples, *then = engine->samples + search->n_rows;
-    if (until <= from || !look(search, ON_STEP, from, now) || !look(search, ON_STEP, until, then))
+    if (until <= from || !look(search, ON_STEP, from, now) || !try_to_look(search, ON_STEP, until, then))
         return from;
     for (size_t row = 0; row < m->n_margins && !search->failed; row++) {
         if (!engine->is_guard[row] || now[row] >= 0.0 || then[row] < 0.0)
@@ -52,6 +53,7 @@ static FlowEnd move_to(Search *search, double t)
     *point->step = 0.0;
     for (size_t i = 0; i < engine->model->n_states; i++)
         point->x[i] = engine->probe_x[i];
+    note_sizes(engine, point);
     return FLOW_EVENT;
 }
 
@@ -72,25 +74,32 @@ static FlowEnd leave_flow_set(Search *search, double t)
         return FLOW_PROBLEM;
     if (enabled || when > t)
         return move_to(search, common_time(search, when));
-    if (move_to(search, t) == FLOW_PROBLEM || !evaluate_flow_set(engine, t, point->x, point->z, &margin))
+    double crossing = last_inside(search, t);
+    if (isfinite(crossing))
+        t = crossing;
+    if (search->failed || move_to(search, t) == FLOW_PROBLEM || !evaluate_flow_set(engine, t, point->x, point->z, &margin))
         return FLOW_PROBLEM;
     blocked(engine, t, point->x, point->z, margin);
     return FLOW_PROBLEM;
 }
 
-/* Guards that are crossed within the tolerance after t count as crossed. */
+/* Guards that are crossed within one instant after t count as crossed.  What lies behind t, which may be the end of
+   the run, is extrapolated from what lies before it. */
 static bool raise_guards(Engine *engine, const Point *point, double t)
 {
     const Model *m = engine->model;
     Search search = {.engine = engine, .point = point, .level = 0.0, .piece_end = t,
                      .n_rows = m->n_margins + 1, .exit_row = m->n_margins, .failed = false};
-    double *now = engine->samples, *then = engine->samples + search.n_rows;
+    double *now = engine->samples, *before = engine->samples + search.n_rows, ahead = one_instant(engine, t);
+    double earlier = fmax(t - ahead, engine->status->start_time), part = ahead / (t - earlier);
     if (m->n_margins == 0)
         return true;
-    if (!look(&search, ON_STEP, t, now) || !look(&search, ON_STEP, t + event_tolerance(t), then))
+    if (!look(&search, ON_STEP, t, now))
         return false;
+    if (!(earlier < t) || !try_to_look(&search, ON_STEP, earlier, before))
+        return true;
     for (size_t row = 0; row < m->n_margins; row++)
-        if (engine->is_guard[row] && now[row] < 0.0 && then[row] >= 0.0)
+        if (engine->is_guard[row] && now[row] < 0.0 && now[row] + part * (now[row] - before[row]) >= 0.0)
             point->level[row] = now[row];
     return true;
 }
@@ -103,16 +112,54 @@ bool raise_levels(Engine *engine, const Point *point, double t)
 bool raise_levels_here(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
-    double now, later, soon = *point->time + event_tolerance(*point->time);
+    double now, t = *point->time, ahead = one_instant(engine, t), earlier = fmax(t - ahead, engine->status->start_time);
+    note_sizes(engine, point);
     if (!step_begin(engine, point) || !raise_guards(engine, point, *point->time))
         return false;
     if (!m->flow_priority || !m->has_flow_set)
         return true;
-    if (!evaluate_flow_set(engine, *point->time, point->x, point->z, &now) || !step_probe(engine, point, soon) ||
-        !evaluate_flow_set(engine, soon, engine->probe_x, point->z, &later))
+    if (!evaluate_flow_set(engine, t, point->x, point->z, &now))
         return false;
-    if (now > 0.0 && later < 0.0)
+    double before = now;
+    if (earlier < t && step_probe(engine, point, earlier) &&
+        evaluate(engine, m->flow_set, earlier, engine->probe_x, point->z, &before, NULL) && now > 0.0 &&
+        now + (now - before) * ahead / (t - earlier) < 0.0)
         point->level[m->n_margins] = now;
+    return true;
+}
+
+bool reach_guard(Engine *engine, const Point *point, double limit)
+{
+    const Model *m = engine->model;
+    double t = *point->time, ahead = one_instant(engine, t), earlier = fmax(t - ahead, engine->status->start_time);
+    double wait = fmin(m->scales.overshoot * time_ulp(t), limit - t), *now = engine->samples;
+    const double *rates = engine->step.k[0];
+    size_t nearest = m->n_margins;
+    if (m->flow_priority || !(earlier < t) || !evaluate_margins(engine, t, point->x, point->z))
+        return false;
+    copy_values(now, engine->margins, m->n_margins);
+    for (size_t i = 0; i < m->n_states; i++)
+        engine->probe_x[i] = point->x[i] - (t - earlier) * rates[i];
+    if (!evaluate_margins(engine, earlier, engine->probe_x, point->z))
+        return false;
+    for (size_t row = 0; row < m->n_margins; row++) {
+        double slope = (now[row] - engine->margins[row]) / (t - earlier);
+        if (engine->is_guard[row] && now[row] < 0.0 && -now[row] <= wait * slope) {
+            wait = -now[row] / slope;
+            nearest = row;
+        }
+    }
+    if (nearest == m->n_margins)
+        return false;
+    *point->time = fmax(t + wait, nextafter(t, INFINITY));
+    for (size_t i = 0; i < m->n_states; i++)
+        point->x[i] += (*point->time - t) * rates[i];
+    *point->step = 0.0;
+    note_sizes(engine, point);
+    if (!evaluate_margins(engine, *point->time, point->x, point->z))
+        return false;
+    clear_levels(engine, point);
+    point->level[nearest] = fmin(0.0, engine->margins[nearest]);
     return true;
 }
 
@@ -133,9 +180,9 @@ FlowEnd locate_event(Engine *engine, const Point *point, double level, double pi
     bool leaves = m->has_flow_set && !search.failed && first_exit(&search, &leaving);
     if (search.failed)
         return FLOW_PROBLEM;
-    if (has_guard && (!leaves || guard <= leaving + event_tolerance(leaving))) {
+    if (has_guard && (!leaves || guard <= leaving + one_instant(engine, leaving))) {
         guard = common_time(&search, guard);
-        if (search.failed || (guard + event_tolerance(guard) > piece_end && !raise_levels(engine, point, guard)))
+        if (search.failed || (guard + one_instant(engine, guard) > piece_end && !raise_levels(engine, point, guard)))
             return FLOW_PROBLEM;
         return move_to(&search, guard);
     }

@@ -58,6 +58,13 @@ typedef struct {
     bool tunable;          /* a parameter that may be set at events and communication points */
 } ModelVariable;
 
+/* The numbers of the semantics, none of which is in seconds or in the unit of a state: see
+   hybrid_model/scales.py, from which the exporter takes them. */
+typedef struct {
+    double roundings, instant, instant_in_gap, border, noise, absolute, probe, overshoot;
+    double accumulation, crowd, resolved;
+} ModelScales;
+
 typedef struct {
     const char *name;                  /* model name, for messages */
     const char *token;                 /* instantiation token */
@@ -70,7 +77,8 @@ typedef struct {
     bool has_flow_set;                 /* false: flow is allowed everywhere */
     bool predictable;                  /* all inputs discrete: the next event follows from the state */
     const double *x, *z, *u, *p;       /* start values */
-    const double *nominals;            /* a usual size of each continuous state */
+    const double *nominals;            /* a usual size of each continuous state, 0 if none is declared */
+    ModelScales scales;
     ModelFunction start;               /* (t,x,z,u,p) -> x0, z0: start values that are computed; copies the others */
     ModelFunction flow;                /* -> dx/dt (n_states) */
     ModelFunction flow_set;            /* -> margin (1); used when has_flow_set */

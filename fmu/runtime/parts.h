@@ -16,23 +16,14 @@
 #define N_SEGMENT 5           /* vectors that give the state on a step: at its start, its change, its curvature (3) */
 #define MESSAGE_SIZE 768
 
-/* Guards that cross within this time (s) are simultaneous.  A state outside the flow set by less
-   than this (in units of the margin), or that is back inside within this time, counts as inside. */
-#define EVENT_TOLERANCE 1e-9
-/* Time events closer than this differ by rounding: 3 * 0.1 and 0.3 are one time. */
-#define TIME_ROUNDING_ULPS 8.0
-/* Width (s) to which a crossing is located, never less than 2 ulp of the time: the shortest probe is half of it. */
-#define LOCATION_TOLERANCE 1e-16
 #define RELATIVE_TOLERANCE 1e-13
 #define RELATIVE_TOLERANCE_MOST 1e-10
-#define ABSOLUTE_TOLERANCE 1e-15
-/* A flow leaves the flow set if its margin falls faster than this (1/s) over that time (s): more than roundings do. */
-#define LEAVING_RATE 1e-6
-#define LEAVING_TIME 1e-6
 #define LOOK_AHEAD_STEPS 20000
 #define LOOK_AHEAD_WORK 200000    /* steps times states, margins and times */
 #define LEAST_STEPS_AHEAD 20
-#define LOOK_AHEAD_TIME 1e6
+/* Without a stop time a look ahead ends after so many times the present time, or what the flow shows of its own. */
+#define LOOK_AHEAD_TIMES 1e6
+#define LOOK_AHEAD_EVENTS 1e3
 #define ADVANCE_STEPS 1000000
 /* So many steps of the importer are looked ahead at once. */
 #define STEPS_AHEAD 64.0
@@ -42,8 +33,8 @@
 /* Jumps at one instant: of each jump on the state, and of the time events together, times their number. */
 #define JUMPS_AT_ONE_TIME 1000
 
-/* A point of the run.  time, step, x, z and level lie one after the other in memory, so one copy
-   moves them all; step is the solver's proposal for the next step, 0 when there is none.  level is
+/* A point of the run.  time, step, x, z, level and size lie one after the other in memory, so one copy
+   moves them all; size holds the largest value that each continuous state has had; step is the solver's proposal for the next step, 0 when there is none.  level is
    the margin from which on each guard is enabled: 0, or slightly below where a flow ended so shortly
    before the crossing that it counts as reached.  Its last entry is the margin of the flow set up to
    which, under flow priority, the state is on the border: 0, or slightly above for the same reason. */
@@ -53,6 +44,7 @@ typedef struct {
     double *x;
     double *z;
     double *level;
+    double *size;
 } Point;
 
 /* The solver's step from x0 at t0 to x1 at t1. */
@@ -71,6 +63,9 @@ typedef enum { PREDICTION_NONE, PREDICTION_EVENT, PREDICTION_RENEWAL, PREDICTION
 typedef struct {
     double times[N_ZENO_TIMES];   /* distinct ones, the newest last */
     double burst_start;
+    double burst_gap;             /* the first one of the burst */
+    double longest;               /* gap so far */
+    double shrinking_from;        /* the first of the gaps that shrink */
     uint64_t total;
     uint64_t stored;
     uint64_t burst;
@@ -79,8 +74,9 @@ typedef struct {
 
 /* The scalars that evolve. */
 typedef struct {
-    double relative_tolerance, absolute_tolerance;
-    double jumps_time;            /* the time at which time_jumps_there counts */
+    double relative_tolerance;
+    double start_time, stop_time;
+    double jumps_time;            /* of the last visible jump, at which time_jumps_there counts */
     uint64_t time_jumps_there;
     uint64_t jumps_taken;         /* in the last advance */
     /* The live point lies on a step of the solver that goes on to segment_end. */
@@ -125,6 +121,7 @@ struct Engine {
     JumpHook jump_hook;
     void *jump_context;
     double target;                /* of the present advance */
+    double largest;               /* state of the present step */
     Ending problem;
     size_t suspect;               /* the state that the solver blames */
     char problem_message[MESSAGE_SIZE];
@@ -154,6 +151,10 @@ bool evaluate(Engine *engine, ModelFunction function, double t, const double *x,
               double *second);
 /* Computes the state that a view shows, into engine->shown, once. */
 bool hold_view(Engine *engine, View view);
+/* The usual size of state i at a point whose value there is x. */
+double state_size(const Engine *engine, const Point *point, size_t i, double x);
+/* The point has got where it is: its states are among those that the run has shown. */
+void note_sizes(const Engine *engine, const Point *point);
 /* Guards are enabled from zero on. */
 void clear_levels(const Engine *engine, const Point *point);
 /* Something that the future depends on has changed. */
@@ -173,6 +174,8 @@ bool first_enabled(Engine *engine, const Point *point, size_t *jump);
 /* integrate.c */
 /* Evaluates the flow at the point into step->k[0]. */
 bool step_begin(Engine *engine, const Point *point);
+/* The length of a first step from the point towards `limit`; step_begin comes before. */
+bool first_step(Engine *engine, const Point *point, double limit, double *h);
 /* One accepted step from the point towards `limit`, which it never passes; the result is in engine->step. */
 bool step_accept(Engine *engine, const Point *point, double limit);
 /* The point takes the end of the step. */
@@ -187,7 +190,12 @@ void segment_keep(Engine *engine);
 void segment_read(Engine *engine, double t);
 
 /* sets.c */
-double event_tolerance(double t);
+/* How far apart (s) crossings may be at `t` and still be one instant. */
+double one_instant(const Engine *engine, double t);
+/* By how much the margin of the flow set may be negative at a state of the present step that counts as inside. */
+double flow_border(Engine *engine, const Point *point, double t, const double *x);
+/* Whether the flow leads out of the flow set from the point, which is on its border; step_begin comes before. */
+bool leads_out(Engine *engine, const Point *point, double margin, bool *out);
 /* Margins of the jumps at (t, x); false if one is not a number. */
 bool evaluate_margins(Engine *engine, double t, const double *x, const double *z);
 bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin);
@@ -199,12 +207,15 @@ bool blocked(Engine *engine, double t, const double *x, const double *z, double 
 /* locate.c */
 /* Looks for the first event on the present step; FLOW_EVENT moves the point there. */
 FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end);
-/* Enables the guards that would cross within the event tolerance after `t`, a time on or at the end of
+/* Enables the guards that would cross within one instant after `t`, a time on or at the end of
    the present step, if the flow could go on: neither a breakpoint nor the end of a run may hide a
    crossing that rounding puts behind it. */
 bool raise_levels(Engine *engine, const Point *point, double t);
 /* The same for the point itself, and for the border of the flow set under flow priority. */
 bool raise_levels_here(Engine *engine, const Point *point);
+/* Goes straight on to a guard where the solver cannot, if it is as near as a solver comes; a flow map that is defined
+   up to a guard only, as a root is, stops it some ulp before. */
+bool reach_guard(Engine *engine, const Point *point, double limit);
 
 /* zeno.c */
 /* Records a jump of the live point at its time; false if it is one too many. */

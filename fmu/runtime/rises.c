@@ -157,7 +157,7 @@ bool next_rise(Rises *rises, double latest, Bracket *bracket)
         if (rises->search->failed)
             return false;
         Verdict verdict = judge(samples);
-        double shortest = DEGREE * DEGREE * time_ulp(fmax(fabs(end), 1.0));
+        double shortest = DEGREE * DEGREE * fmax(time_ulp(begin), time_ulp(end));
         if (!verdict.settled && rises->halvings < HALVINGS && end - begin > shortest) {
             rises->halvings++;
             rises->ends[rises->n_ends++] = 0.5 * (begin + end);

@@ -46,6 +46,8 @@ typedef struct {
 /* Fills `rows` with the margins at a time of the step; a failure is noted in the search and ends every
    loop on it. */
 bool look(Search *search, Path path, double t, double *rows);
+/* The same where the run need not come: a failure only says that nothing is known. */
+bool try_to_look(Search *search, Path path, double t, double *rows);
 /* The value of one row. */
 double look_at(Search *search, Path path, double t, size_t row);
 /* The value of one row in a sample of the present step. */
@@ -54,6 +56,9 @@ double sample(const Search *search, size_t i, size_t row);
 void polish(Search *search, size_t row, Bracket *bracket);
 /* The first guard crossing on the step; with flow priority guards are not looked at inside the flow set. */
 bool first_guard(Search *search, double *t);
+/* The last time before `t` at which the flow set's margin falls below zero: minus infinity if the interpolation has
+   none, not a number if the step has none. */
+double last_inside(Search *search, double t);
 /* The time at which the flow set is left, if the step leaves it by more than the tolerance. */
 bool first_exit(Search *search, double *t);
 

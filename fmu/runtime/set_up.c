@@ -18,9 +18,9 @@ Answer instance_set_up(void *handle, const char *function, const Experiment *exp
                       instance->name, stop, start);
     if (experiment->has_tolerance)
         engine_set_tolerance(instance->engine, tolerance);
-    engine_set_time(instance->engine, start);
     instance->run->time = start;
     instance->run->stop_time = experiment->has_stop ? stop : INFINITY;
+    engine_set_span(instance->engine, start, instance->run->stop_time);
     return ANSWER_OK;
 }
 

@@ -3,9 +3,13 @@
 
 #include "search.h"
 
-double event_tolerance(double t)
+double one_instant(const Engine *engine, double t)
 {
-    return fmax(EVENT_TOLERANCE, 8.0 * time_ulp(t));
+    const ModelScales *scales = &engine->model->scales;
+    const Status *status = engine->status;
+    double by_run = scales->instant * (t - status->start_time);
+    double by_gap = scales->instant_in_gap * (t - status->jumps_time);
+    return fmax(scales->roundings * time_ulp(t), fmin(by_run, by_gap));
 }
 
 bool evaluate_margins(Engine *engine, double t, const double *x, const double *z)
@@ -46,19 +50,78 @@ bool blocked(Engine *engine, double t, const double *x, const double *z, double 
                    t, margin, describe_state(engine, x, z, values, sizeof values));
 }
 
+/* The margin of the flow set at a point that the run need not reach; not a number if there is none. */
+static double trial_margin(Engine *engine, double t, const double *x, const double *z)
+{
+    double margin;
+    return evaluate(engine, engine->model->flow_set, t, x, z, &margin, NULL) ? margin : (double)NAN;
+}
+
+/* How much the margin changes when states move by a small part of their sizes, all one way or to and fro: no simple
+   sum of states hides from both. */
+static double change_by_size(Engine *engine, const Point *point, double t, const double *x, double here, bool to_and_fro)
+{
+    double *moved = engine->probe_x, border = engine->model->scales.border;
+    for (size_t i = 0; i < engine->model->n_states; i++) {
+        double weight = 1.0 - 0.5 * fmod((double)i * 0.6180339887498949, 1.0);
+        double sign = to_and_fro && i % 2 ? -1.0 : 1.0;
+        moved[i] = x[i] + border * sign * weight * state_size(engine, point, i, x[i]);
+    }
+    return fabs(trial_margin(engine, t, moved, point->z) - here);
+}
+
+/* How much the margin changes when the states go on for one instant. */
+static double change_by_time(Engine *engine, const Point *point, double t, const double *x, double here)
+{
+    const Model *m = engine->model;
+    double *rates = engine->probe_k[1], *moved = engine->probe_x, wait = one_instant(engine, t);
+    if (m->n_states > 0 && !evaluate(engine, m->flow, t, x, point->z, rates, NULL))
+        return 0.0;
+    for (size_t i = 0; i < m->n_states; i++) {
+        if (!isfinite(rates[i]))
+            return 0.0;
+        moved[i] = x[i] + wait * rates[i];
+    }
+    return fabs(trial_margin(engine, t, moved, point->z) - here);
+}
+
+double flow_border(Engine *engine, const Point *point, double t, const double *x)
+{
+    double here = trial_margin(engine, t, x, point->z);
+    double by_size = fmax(change_by_size(engine, point, t, x, here, false), change_by_size(engine, point, t, x, here, true));
+    double width = by_size + change_by_time(engine, point, t, x, here);
+    return isfinite(width) ? width : 0.0;
+}
+
+bool leads_out(Engine *engine, const Point *point, double margin, bool *out)
+{
+    const Status *status = engine->status;
+    double h, t = *point->time;
+    if (!first_step(engine, point, fmax(status->stop_time, t), &h))
+        return false;
+    double probe = engine->model->scales.probe * h;
+    /* Nothing is evaluated beyond the end of the run. */
+    bool forward = t + probe <= status->stop_time;
+    *out = false;
+    if (!forward && t - probe < status->start_time)
+        return true;
+    double there = forward ? t + probe : t - probe;
+    if (!step_probe(engine, point, there))
+        return false;
+    double change = trial_margin(engine, there, engine->probe_x, point->z) - margin;
+    *out = forward ? change < 0.0 : change > 0.0;
+    return true;
+}
+
 bool flow_may_begin(Engine *engine, const Point *point, double *level)
 {
-    double margin, later, t = *point->time;
+    double margin, t = *point->time;
     *level = 0.0;
     if (!engine->model->has_flow_set)
         return true;
     if (!evaluate_flow_set(engine, t, point->x, point->z, &margin))
         return false;
     *level = fmin(0.0, margin);
-    if (margin >= -EVENT_TOLERANCE)
-        return true;
-    double soon = t + event_tolerance(t);
-    if (!step_probe(engine, point, soon) || !evaluate_flow_set(engine, soon, engine->probe_x, point->z, &later))
-        return false;
-    return later >= 0.0 || blocked(engine, t, point->x, point->z, margin);
+    return margin >= 0.0 || margin >= -flow_border(engine, point, t, point->x) ||
+           blocked(engine, t, point->x, point->z, margin);
 }

@@ -3,6 +3,18 @@
 
 #include "parts.h"
 
+double state_size(const Engine *engine, const Point *point, size_t i, double x)
+{
+    double nominal = engine->model->nominals[i];
+    return nominal > 0.0 ? nominal : fmax(point->size[i], fabs(x));
+}
+
+void note_sizes(const Engine *engine, const Point *point)
+{
+    for (size_t i = 0; i < engine->model->n_states; i++)
+        point->size[i] = fmax(point->size[i], fabs(point->x[i]));
+}
+
 void clear_levels(const Engine *engine, const Point *point)
 {
     for (size_t i = 0; i <= engine->model->n_margins; i++)
@@ -38,7 +50,14 @@ void engine_set_tolerance(Engine *engine, double relative)
     /* Below the least rounding would decide about steps; above the greatest event times would suffer. */
     double tolerance = fmax(fmin(1e-3 * relative, RELATIVE_TOLERANCE_MOST), RELATIVE_TOLERANCE);
     engine->status->relative_tolerance = tolerance;
-    engine->status->absolute_tolerance = ABSOLUTE_TOLERANCE * (tolerance / RELATIVE_TOLERANCE);
+}
+
+void engine_set_span(Engine *engine, double start, double stop)
+{
+    Status *status = engine->status;
+    engine_set_time(engine, start);
+    status->start_time = status->jumps_time = start;
+    status->stop_time = stop;
 }
 
 void engine_set_time(Engine *engine, double t)

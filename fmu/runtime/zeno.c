@@ -2,18 +2,26 @@
    counted by itself: many parts of a model that jump together are not yet an accumulation.
 
    (a) more jumps at one instant than any cascade needs; (b) gaps that shrink like a geometric
-   sequence whose rest is below the tolerance: the jumps accumulate; (c) a burst of jumps in
-   a time in which nothing but chattering can do that. */
+   sequence whose rest is small beside them: the jumps accumulate; (c) a burst of jumps at gaps that still
+   shrink and are small beside the longest one, or that floating point does not resolve. */
 #include <math.h>
 
 #include "parts.h"
 
 #define N_GAPS 8                  /* gaps that must look geometric */
 #define RATIO_SPREAD 0.05
-#define REST_TOLERANCE 1e-6       /* s */
-#define RESOLVED_ULPS 1e4         /* a rest below so many ulp of the time is not resolved any more */
 #define BURST_JUMPS 100
-#define BURST_TIME 1e-6           /* s */
+#define BURST_SHRINKS 0.999       /* gaps shrink within a burst if the last is less than this part of the first */
+
+/* Keeps the longest gap, and the first one of those that shrink. */
+static void measure(JumpHistory *history, double t)
+{
+    double gap = t - history->times[N_ZENO_TIMES - 1];
+    bool shrinks = history->stored > 1 && gap < history->times[N_ZENO_TIMES - 1] - history->times[N_ZENO_TIMES - 2];
+    history->longest = fmax(history->longest, gap);
+    if (!shrinks)
+        history->shrinking_from = gap;
+}
 
 static void remember(JumpHistory *history, double t)
 {
@@ -22,16 +30,35 @@ static void remember(JumpHistory *history, double t)
     if (history->stored > 0 && history->times[N_ZENO_TIMES - 1] == t)
         return;
     history->at_once = 1;
+    if (history->stored > 0)
+        measure(history, t);
     for (size_t i = 0; i + 1 < N_ZENO_TIMES; i++)
         history->times[i] = history->times[i + 1];
     history->times[N_ZENO_TIMES - 1] = t;
     if (history->stored < N_ZENO_TIMES)
         history->stored++;
-    if (history->burst == 0 || t - history->burst_start > BURST_TIME) {
+    if (history->burst == 0 || history->burst >= BURST_JUMPS) {
         history->burst_start = t;
         history->burst = 0;
     }
     history->burst++;
+    if (history->burst == 2)
+        history->burst_gap = t - history->burst_start;
+}
+
+static double last_gap(const JumpHistory *history)
+{
+    return history->times[N_ZENO_TIMES - 1] - history->times[N_ZENO_TIMES - 2];
+}
+
+/* Whether a burst is full, and an accumulation. */
+static bool crowded(const Engine *engine, const JumpHistory *history, double t)
+{
+    const ModelScales *scales = &engine->model->scales;
+    double span = t - history->burst_start;
+    bool shrinks = last_gap(history) < BURST_SHRINKS * history->burst_gap;
+    return history->burst >= BURST_JUMPS && ((shrinks && span <= scales->crowd * history->longest) ||
+                                             span <= BURST_JUMPS * scales->resolved * time_ulp(t));
 }
 
 /* Whether the newest gaps shrink geometrically: the last gap, and the last ratio. */
@@ -65,14 +92,15 @@ bool zeno_record(Engine *engine, size_t jump)
                        at_once, name, t);
     if (shrinking(history, &gap, &ratio)) {
         double rest = gap * ratio / (1.0 - ratio);
-        if (rest <= fmax(REST_TOLERANCE, RESOLVED_ULPS * time_ulp(t)))
+        const ModelScales *scales = &engine->model->scales;
+        if (rest <= fmax(scales->accumulation * history->shrinking_from, scales->resolved * time_ulp(t)))
             return problem(engine, ENDED_ZENO,
                            "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "
                            "ratio %.3f). Remedy: end the run before that time, or give the jump set a minimum dwell "
                            "time.",
                            total, name, t, t + rest, gap, ratio);
     }
-    if (burst >= BURST_JUMPS)
+    if (crowded(engine, history, t))
         return problem(engine, ENDED_ZENO,
                        "Zeno: %llu jumps of '%s' in %.2g s around t = %.10g s. Remedy: end the run before that time, "
                        "or give the jump set a minimum dwell time.",

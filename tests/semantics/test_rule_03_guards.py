@@ -90,11 +90,15 @@ def test_a_state_outside_the_flow_set_by_less_than_the_tolerance_counts_as_insid
             return {"x": 0.0}
 
         def flow_set(self, s):
-            return -s.x
+            return s.size - s.x
 
-    assert hm.simulate(Wall(x=0.5e-9), 1.0).stop is hm.Stop.HORIZON
-    assert hm.simulate(Wall(x=2e-9), 1.0).stop is hm.Stop.BLOCKED
-    assert hm.simulate(Wall(x=2e-9), 1.0, solver=hm.Solver(event_tolerance=1e-8)).stop is hm.Stop.HORIZON
+        size = hm.Parameter(1.0)
+
+    for size in (1e-20, 1.0, 1e20):
+        inside, outside = (Wall(x=size * (1.0 + part), size=size) for part in (0.5e-9, 2e-9))
+        assert hm.simulate(inside, 1.0).stop is hm.Stop.HORIZON
+        assert hm.simulate(outside, 1.0).stop is hm.Stop.BLOCKED
+    assert hm.simulate(Wall(x=1.0 + 2e-9), 1.0, solver=hm.Solver(event_tolerance=1e-8)).stop is hm.Stop.HORIZON
 
 
 @pytest.mark.parametrize("corridor", [Corridor, PatientCorridor])

@@ -72,10 +72,40 @@ def test_chattering_is_stopped():
     assert told_time(arc.message) == pytest.approx(100.0 * np.log(16.0 / 15.0), abs=1e-3)
 
 
-def test_chattering_with_a_gap_far_below_any_dwell_time_is_stopped():
-    arc = hm.simulate(Ramp(threshold=1e-9), 1.0)
+def test_chattering_with_gaps_that_floats_do_not_resolve_is_stopped():
+    # 45 ulp of 1 s from jump to jump.
+    arc = hm.simulate(Ramp(threshold=1e-14), 2.0, t_start=1.0)
+    assert arc.stop is hm.Stop.ZENO
+    assert re.search(r"100 jumps of 'moved' in 9.9e-13 s", arc.message)
+
+
+def test_a_window_in_seconds_is_the_users_word():
+    arc = hm.simulate(Ramp(threshold=1e-9), 1.0, zeno=hm.ZenoGuard(window=1e-6))
     assert arc.stop is hm.Stop.ZENO
     assert re.search(r"100 jumps of 'moved' in 9.9e-08 s", arc.message)
+
+
+def test_gaps_that_shrink_like_one_over_n_squared_crowd_in_the_end():
+    """No geometric series; but after a first gap of 1 s, those from n = 10 000 on crowd within a millionth of it."""
+
+    class Basel(hm.HybridAutomaton):
+        x = hm.State(0.0)
+        n = hm.DiscreteState(1, integer=True)
+        skipped = hm.Parameter(9900.0)
+
+        def flow_map(self, s):
+            return {"x": 1.0}
+
+        def jump_set(self, s):
+            return s.x - np.where(s.n == 1, 1.0, 1.0 / (s.n + s.skipped) ** 2)
+
+        def jump_map(self, s):
+            return {"x": 0.0, "n": s.n + 1}
+
+    arc = hm.simulate(Basel(), 2.0)
+    assert arc.stop is hm.Stop.ZENO
+    # 100 gaps between 1 / n^2 and 1 / (n + 100)^2 come within 1e-6 s from n = 9950 on.
+    assert 9950 - 9900 + 99 <= len(arc.jumps) <= 9950 - 9900 + 103
 
 
 def test_gaps_that_shrink_more_slowly_than_geometrically_are_no_accumulation_before_they_crowd():
