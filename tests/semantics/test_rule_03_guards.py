@@ -105,7 +105,8 @@ def test_a_state_outside_the_flow_set_by_less_than_the_tolerance_counts_as_insid
 def test_a_state_just_outside_that_flows_further_out_is_blocked_and_does_not_fall_through(corridor):
     arc = hm.simulate(corridor(x=2.0 + 0.5e-9, door=9.0), 1.0)
     assert arc.stop is hm.Stop.BLOCKED
-    assert arc.end.x < 2.0 + 3e-9
+    # By 1e-9 of the size of the state, twice: once as it is, once where the flow set is seen to be left.
+    assert arc.end.x < 2.0 * (1.0 + 2e-9)
 
 
 def test_under_flow_priority_rounding_at_the_border_of_a_large_set_does_not_block():
