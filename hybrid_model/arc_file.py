@@ -21,7 +21,7 @@ from hybrid_model.arc import HybridArc
 from hybrid_model.arc_values import ArcValues, RecordedValues
 from hybrid_model.errors import DataError
 from hybrid_model.execution import JumpRecord
-from hybrid_model.flow import FlowPiece
+from hybrid_model.flow_piece import FlowPiece
 from hybrid_model.flow_record import FlowRecord
 from hybrid_model.interpolants import Interpolant, Polynomial, interpolate
 from hybrid_model.recorded import RecordedAutomaton

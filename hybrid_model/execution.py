@@ -15,7 +15,8 @@ import numpy as np
 from hybrid_model.automaton import Automaton
 from hybrid_model.borders import border, leads_out
 from hybrid_model.errors import SimulationError
-from hybrid_model.flow import FlowPiece, integrate, straight_piece
+from hybrid_model.flow import integrate
+from hybrid_model.flow_piece import FlowPiece, straight_piece
 from hybrid_model.layout import not_finite
 from hybrid_model.scales import ROUNDINGS, one_instant, ulp
 from hybrid_model.signals import Inputs

@@ -6,7 +6,7 @@ import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from hybrid_model.flow import FlowPiece
+from hybrid_model.flow_piece import FlowPiece
 from hybrid_model.variables import FloatArray
 
 

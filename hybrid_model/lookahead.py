@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 
 from hybrid_model.execution import Execution, JumpRecord
-from hybrid_model.flow import FlowPiece
+from hybrid_model.flow_piece import FlowPiece
 from hybrid_model.recording import Recording
 from hybrid_model.variables import FloatArray
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hybrid_model.flow import FlowPiece
+from hybrid_model.flow_piece import FlowPiece
 from hybrid_model.flow_record import FlowRecord
 from hybrid_model.variables import FloatArray
 
