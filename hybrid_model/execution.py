@@ -81,7 +81,7 @@ class Execution:
     x, z, p : ndarray
         Continuous states, discrete states, and parameters as they are at t.
     t_jump : float
-        Time of the last jump in s; at first the start time.
+        Time in s of the last jump that is no breakpoint; at first the start time.
     sizes : ndarray
         Usual size of each continuous state: the nominal value, or the largest that the run has shown.
     guards : int
@@ -207,7 +207,8 @@ class Execution:
         self._require_whole(f"after jump {info.name!r} at t = {self.t:.9g} s")
         record = JumpRecord(self.t, self.j, index, info.name, x, z, self.x, self.z)
         self.j += 1
-        self.t_jump = self.t
+        if not info.internal:
+            self.t_jump = self.t
         self.arrive(self.t, self.x)
         self._left_flow_set = False
         on_state = info.trigger is Trigger.STATE
@@ -350,8 +351,6 @@ class Execution:
 
     def move(self, t: float, x: FloatArray, z: FloatArray, j: int) -> None:
         """Move to a point of a flow that a copy of this execution has already flown."""
-        if j != self.j:
-            self.t_jump = t
         self.z, self.j = z, j
         self.arrive(t, x)
         self.tune()

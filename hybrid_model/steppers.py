@@ -57,6 +57,7 @@ class FlowMap:
         self._count = 0
 
     def __call__(self, t: float, x: FloatArray) -> FloatArray:
+        """Return dx/dt; not a number where the map cannot be evaluated."""
         execution = self._execution
         t = min(t, self._last)
         u = execution.inputs.at(t) if self._held is None else self._held
@@ -187,6 +188,7 @@ def _failure(execution: Execution, flow_map: FlowMap, t: float, x: FloatArray, p
 
 
 def move(execution: Execution, piece: FlowPiece) -> FlowPiece:
+    """Bring an execution to the end of a piece, which must be finite."""
     bad = not_finite(execution.layout, Kind.STATE, piece.x1)
     if bad:
         raise SimulationError(f"{execution.automaton.name}: {bad} at t = {piece.t1:.9g} s: states must stay finite.")

@@ -151,6 +151,8 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     engine->outputs = take(&cursor, m->n_outputs * sizeof(double));
     engine->rates = take(&cursor, vector);
     engine->indicators = take(&cursor, rows * sizeof(double));
+    engine->slopes = take(&cursor, 2 * (m->n_states + m->n_outputs) * sizeof(double));
+    engine->unit = take(&cursor, seed_count(m) * sizeof(double));
     for (size_t i = 0; i < 2; i++)
         engine->seeds[i] = take(&cursor, seed_count(m) * sizeof(double));
     engine->is_guard = take(&cursor, rows);

@@ -112,6 +112,8 @@ struct Engine {
     double *margins, *enabled, *times, *samples;
     double *outputs, *rates, *indicators;   /* of the view */
     double *seeds[2];
+    double *slopes;               /* rates and outputs on both sides of a point */
+    double *unit;                 /* a direction */
     unsigned char *is_guard;      /* of each margin: some jump waits for it */
     Point reset, shown;           /* result of a reset map; what a view shows */
     View view;
@@ -216,6 +218,13 @@ bool raise_levels_here(Engine *engine, const Point *point);
 /* Goes straight on to a guard where the solver cannot, if it is as near as a solver comes; a flow map that is defined
    up to a guard only, as a root is, stops it some ulp before. */
 bool reach_guard(Engine *engine, const Point *point, double limit);
+
+/* differences.c */
+/* Puts difference quotients along a direction in the place of those of `rates` and `outputs` that are not numbers,
+   where both sides agree on one. */
+bool mend_slopes(Engine *engine, double *const direction[MODEL_N_ARG], double *rates, double *outputs);
+/* The same for the sensitivities in `seeds`, whose weights are there. */
+bool mend_sensitivities(Engine *engine, double *const seeds[N_SEEDS]);
 
 /* zeno.c */
 /* Records a jump of the live point at its time; false if it is one too many. */

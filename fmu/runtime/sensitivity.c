@@ -53,7 +53,8 @@ bool engine_forward(Engine *engine, View view, double *const seeds[N_SEEDS])
         copy_values(seeds[SEED_SHOWN + 1], seeds[SEED_STATES + 1], m->n_discrete);
     }
     double *onward[MODEL_N_ARG] = {seeds[0], seeds[SEED_SHOWN], seeds[SEED_SHOWN + 1], seeds[3], seeds[4]};
-    return call(engine, m->forward, &engine->shown, onward, MODEL_N_ARG, wanted, 2);
+    return call(engine, m->forward, &engine->shown, onward, MODEL_N_ARG, wanted, 2) &&
+           mend_slopes(engine, onward, wanted[0], wanted[1]);
 }
 
 static void add(double *to, const double *more, size_t n)
@@ -67,7 +68,8 @@ bool engine_reverse(Engine *engine, View view, double *const seeds[N_SEEDS])
     const Model *m = engine->model;
     double *back[N_SEEDS], *const *x = seeds + SEED_STATES;
     if (!hold_view(engine, view) ||
-        !call(engine, m->reverse, &engine->shown, seeds + SEED_RATES, 2, seeds, MODEL_N_ARG))
+        !call(engine, m->reverse, &engine->shown, seeds + SEED_RATES, 2, seeds, MODEL_N_ARG) ||
+        !mend_sensitivities(engine, seeds))
         return false;
     add(x[0], seeds[SEED_SHOWN], m->n_states);
     add(x[1], seeds[SEED_SHOWN + 1], m->n_discrete);

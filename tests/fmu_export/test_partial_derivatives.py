@@ -264,3 +264,38 @@ def test_an_infinite_derivative_is_not_given(fmi, exported):
     component.do("SetContinuousStates", doubles([0.75]), c.c_size_t(1))
     assert component.derivative(FORWARD, ["y", "der(x)"], ["x"], [1.0]) == (OK, [-1.0, 16.0])
     component.free()
+
+
+class Clipped(hm.HybridAutomaton):
+    """A root of what is cut off at zero: below, the chain rule has infinity times zero, the derivative is zero."""
+
+    h = hm.State(-0.25, output=True)
+    gain = hm.Parameter(3.0)
+    y = hm.Output()
+
+    def flow_map(self, s):
+        return {"h": -s.gain * np.sqrt(np.maximum(s.h, 0.0))}
+
+    def outputs(self, s):
+        return {"y": 2.0 * s.h + np.sqrt(np.maximum(s.h, 0.0))}
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize(("h", "slopes"), [(-0.25, (0.0, 2.0)), (-1e-9, (0.0, 2.0)), (0.25, (-3.0, 3.0))])
+def test_a_root_of_what_is_cut_off_has_its_derivatives(fmi, h, slopes, exported):
+    component = instance({fmi: Binary(exported(Clipped(), "clipped", fmi))}, f"{fmi} ME")
+    Journey(component, h=h)
+    for unknown, slope in zip(("der(h)", "y"), slopes, strict=True):
+        # A difference quotient over a millionth of h; the root is straight there up to 1e-6.
+        status, found = component.derivative(FORWARD, [unknown], ["h"], [1.0])
+        assert (status, found) == (OK, [pytest.approx(slope, rel=1e-9, abs=1e-9)])
+        if fmi == "3.0":
+            status, found = component.derivative(REVERSE, [unknown], ["h"], [1.0])
+            assert (status, found) == (OK, [pytest.approx(slope, rel=1e-9, abs=1e-9)])
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_where_the_two_sides_have_different_slopes_there_is_no_derivative(fmi, exported):
+    component = instance({fmi: Binary(exported(Clipped(), "clipped", fmi))}, f"{fmi} ME")
+    Journey(component, h=0.0)
+    assert component.derivative(FORWARD, ["der(h)"], ["h"], [1.0])[0] == DISCARD
