@@ -57,7 +57,7 @@ _MAPS = (
     *("forward", "reverse", "start_forward", "start_reverse"),
 )
 _SCALES = (
-    *("roundings", "instant", "instant_in_gap", "border", "absolute", "probe", "overshoot"),
+    *("roundings", "instant", "instant_in_gap", "border", "absolute", "rounding_level", "probe", "overshoot"),
     *("accumulation", "crowd", "resolved"),
 )
 """As `ModelScales` has them; the numbers are those of `hybrid_model.scales`."""

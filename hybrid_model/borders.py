@@ -13,7 +13,7 @@ import numpy as np
 
 from hybrid_model.errors import SimulationError
 from hybrid_model.first_step import first_step
-from hybrid_model.scales import PROBE, moves, one_instant
+from hybrid_model.scales import PROBE, moves, one_instant, usual_sizes
 from hybrid_model.variables import FloatArray
 
 if TYPE_CHECKING:
@@ -47,6 +47,7 @@ def border(execution: Execution, t: float, x: FloatArray) -> float:
     if execution.solver.event_tolerance is not None:
         return execution.solver.event_tolerance
     u, sizes = execution.inputs.at(t), execution.sizes_with(x)
+    sizes = np.where(np.isnan(execution.nominal), usual_sizes(sizes), sizes)
     points = [x + move for move in moves(sizes)]
     rates = quiet_rates(execution, t, x)
     if np.isfinite(rates).all():

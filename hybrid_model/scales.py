@@ -25,7 +25,9 @@ BORDER = 1e-9
 NOISE = 1e-15
 """The same, where only rounding is meant: under flow priority a flow set is left beyond it."""
 ABSOLUTE = 1e-15
-"""Absolute tolerance of a step, as a part of the size of the states."""
+"""Absolute tolerance of a step, as a part of the usual size of a state."""
+ROUNDING_LEVEL = 1e-12
+"""A state below this part of the largest one may be rounding: no digit of it is to be had."""
 PROBE = 1e-6
 """Where a flow leads from a border is looked at after this part of a step of the solver."""
 OVERSHOOT = 1000.0
@@ -59,6 +61,41 @@ def one_instant(t: float, t_start: float, t_last: float) -> float:
         In s.
     """
     return max(ROUNDINGS * ulp(t), min(INSTANT * (t - t_start), INSTANT_IN_GAP * (t - t_last)))
+
+
+def usual_sizes(sizes: FloatArray) -> FloatArray:
+    """Return the sizes of states of which borders are parts: their own, but what may be all rounding counts as large.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (n,)
+        Largest value of each state so far.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    largest = float(sizes.max(initial=0.0))
+    return np.where(sizes < ROUNDING_LEVEL * largest, largest, sizes)
+
+
+def tolerance_sizes(sizes: FloatArray) -> FloatArray:
+    """Return the sizes of states of which absolute tolerances are parts.
+
+    They lie between a state's usual size and the largest one, by the geometric mean: the digits of a small state count,
+    but not those that rounding errors of the large states leave no more.
+
+    Parameters
+    ----------
+    sizes : ndarray, shape (n,)
+        Largest value of each state so far, not all zero.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+    """
+    usual = usual_sizes(sizes)
+    return np.sqrt(usual) * math.sqrt(usual.max())
 
 
 def moves(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:

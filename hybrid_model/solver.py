@@ -36,7 +36,7 @@ class Solver(ExplainedCall):
         Relative tolerance of a step, as in SciPy.
     atol : float, optional
         Absolute tolerance of a step, as in SciPy; default: 1e-15 of the nominal value where a state has one, else of
-        the largest state of the run so far.
+        its usual size (`hybrid_model.scales.tolerance_sizes`).
     max_step : float
         Longest step in s.
     scan_points : int

@@ -13,7 +13,7 @@ from hybrid_model.errors import HybridModelError, SimulationError
 from hybrid_model.flow_piece import FlowPiece, straight_piece
 from hybrid_model.layout import not_finite
 from hybrid_model.locate import SMALLEST
-from hybrid_model.scales import ABSOLUTE, ulp
+from hybrid_model.scales import ABSOLUTE, ulp, tolerance_sizes
 from hybrid_model.variables import FloatArray, Kind
 
 if TYPE_CHECKING:
@@ -134,15 +134,17 @@ def _stepper(execution: Execution, flow_map: FlowMap, end: float, first: float) 
 
 
 def _absolute_tolerance(execution: Execution, reach: float) -> FloatArray:
-    """Return the absolute tolerance of each state: a part of its nominal value, else of the largest state so far.
+    """Return the absolute tolerance of each state: a part of its nominal value, else of its usual size.
 
-    A state of its own size would not do: of one that is zero up to rounding no digit is to be had. `reach` is how far
-    the first step leads: states that start at zero have no size yet.
+    `reach` is how far the first step leads: states that start at zero have no size yet.
     """
     if execution.solver.atol is not None:
         return np.full(execution.x.shape, execution.solver.atol)
-    largest = max(float(execution.sizes.max()), reach, SMALLEST / ABSOLUTE)
-    return ABSOLUTE * np.where(np.isnan(execution.nominal), largest, execution.nominal)
+    sizes = execution.sizes
+    if reach > sizes.max():
+        sizes = np.maximum(sizes, reach)
+    usual = tolerance_sizes(np.maximum(sizes, SMALLEST / ABSOLUTE))
+    return ABSOLUTE * np.where(np.isnan(execution.nominal), usual, execution.nominal)
 
 
 class Pace:

@@ -62,11 +62,13 @@ class Watch:
         if not self._watched:
             return None
         if self._execution.automaton.has_flow_set:
-            width = border(self._execution, piece.t1, piece.x1)
-            self._slack = width * (NOISE / BORDER) if self._flow_first and self._seen_inside else width
+            at_once = self._flow_first and self._seen_inside
+            self._slack = 0.0 if at_once else border(self._execution, piece.t1, piece.x1)
         for a, b in itertools.pairwise(np.linspace(piece.t0, piece.t1, self._panels + 1)):
             for start, stop in self._parts(piece, float(a), float(b)):
                 found = self._first_in_panel(piece, start, stop)
+                if found is not None and self._flow_first:
+                    found = self._beyond_border(piece, start, stop, found[0])
                 if found is not None:
                     t, row = found
                     left = row >= self._guards
@@ -74,6 +76,14 @@ class Watch:
                         t = self._last_inside(piece, t)
                     return self._latest_of_simultaneous(piece, t, end), left
         return None
+
+    def _beyond_border(self, piece: FlowPiece, a: float, b: float, t: float) -> tuple[float, int] | None:
+        """Return an exit that is found at `t` as one beyond the border as it is there, if it is one."""
+        before, width = self._slack, border(self._execution, t, self.state(piece, t))
+        self._slack = width * (NOISE / BORDER) if self._seen_inside else width
+        found = self._first_in_panel(piece, a, b)
+        self._slack = before
+        return found
 
     def _last_inside(self, piece: FlowPiece, t: float) -> float:
         """Return the time before `t` at which a flow that is beyond the border there has crossed it."""
@@ -95,8 +105,7 @@ class Watch:
                 seen = float(times[inside[0]])
                 if seen > a:
                     yield a, seen
-                self._seen_inside, a = True, seen
-                self._slack *= NOISE / BORDER
+                self._seen_inside, self._slack, a = True, 0.0, seen
         if b > a:
             yield a, b
 

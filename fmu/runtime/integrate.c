@@ -77,18 +77,19 @@ static bool stages(Engine *engine, const double *z, double t0, double t1, const 
     return true;
 }
 
-/* The absolute part follows from the nominal value, or from the largest state so far: of a state that is zero up to
-   rounding no digit is to be had. */
-static double scale(const Engine *engine, size_t i, double size)
+/* The absolute part follows from the nominal value, or from the sizes of the states: see usual_sizes in
+   hybrid_model/scales.py. */
+static double scale(const Engine *engine, const Point *point, size_t i, double size)
 {
     const Status *status = engine->status;
+    const ModelScales *scales = &engine->model->scales;
     double nominal = engine->model->nominals[i], looser = status->relative_tolerance / RELATIVE_TOLERANCE;
-    double usual = nominal > 0.0 ? nominal : engine->largest;
-    return engine->model->scales.absolute * looser * usual + status->relative_tolerance * size;
+    double part = fmax(point->size[i], size) / engine->largest;
+    double usual = engine->largest * (part < scales->rounding_level ? 1.0 : sqrt(part));
+    return scales->absolute * looser * (nominal > 0.0 ? nominal : usual) + status->relative_tolerance * size;
 }
 
-/* The largest state that the run has shown at the point, and at x. */
-static double largest_state(const Engine *engine, const Point *point, const double *x)
+double largest_state(const Engine *engine, const Point *point, const double *x)
 {
     double largest = DBL_MIN / engine->model->scales.absolute;
     for (size_t i = 0; i < engine->model->n_states; i++)
@@ -97,14 +98,14 @@ static double largest_state(const Engine *engine, const Point *point, const doub
 }
 
 /* The error of the step in units of the tolerance, infinite if anything is not finite. */
-static double step_error(Engine *engine, const Step *step, double h)
+static double step_error(Engine *engine, const Point *point, const Step *step, double h)
 {
     double worst = 0.0;
     for (size_t i = 0; i < engine->model->n_states; i++) {
         double sum = 0.0;
         for (size_t s = 0; s < N_STAGES; s++)
             sum += ERROR_WEIGHT[s] * step->k[s][i];
-        double error = fabs(h * sum) / scale(engine, i, fmax(fabs(step->x0[i]), fabs(step->x1[i])));
+        double error = fabs(h * sum) / scale(engine, point, i, fmax(fabs(step->x0[i]), fabs(step->x1[i])));
         if (!isfinite(error) || !isfinite(step->x1[i])) {
             engine->suspect = i;
             return INFINITY;
@@ -221,7 +222,7 @@ bool step_accept(Engine *engine, const Point *point, double limit)
             !derivative(engine, step->t1, step->x1, point->z, step->k[N_STAGES - 1]))
             return false;
         engine->largest = largest_state(engine, point, step->x1);
-        double error = step_error(engine, step, used);
+        double error = step_error(engine, point, step, used);
         if (error <= 1.0) {
             *point->step = next_step(h, used, error, rejected);
             step->has_dense = false;

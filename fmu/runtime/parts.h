@@ -155,6 +155,8 @@ bool evaluate(Engine *engine, ModelFunction function, double t, const double *x,
 bool hold_view(Engine *engine, View view);
 /* The usual size of state i at a point whose value there is x. */
 double state_size(const Engine *engine, const Point *point, size_t i, double x);
+/* The largest state that the run has shown at the point, and at x. */
+double largest_state(const Engine *engine, const Point *point, const double *x);
 /* The point has got where it is: its states are among those that the run has shown. */
 void note_sizes(const Engine *engine, const Point *point);
 /* Guards are enabled from zero on. */

@@ -61,11 +61,14 @@ static double trial_margin(Engine *engine, double t, const double *x, const doub
    sum of states hides from both. */
 static double change_by_size(Engine *engine, const Point *point, double t, const double *x, double here, bool to_and_fro)
 {
-    double *moved = engine->probe_x, border = engine->model->scales.border;
+    double *moved = engine->probe_x, border = engine->model->scales.border, largest = largest_state(engine, point, x);
     for (size_t i = 0; i < engine->model->n_states; i++) {
         double weight = 1.0 - 0.5 * fmod((double)i * 0.6180339887498949, 1.0);
         double sign = to_and_fro && i % 2 ? -1.0 : 1.0;
-        moved[i] = x[i] + border * sign * weight * state_size(engine, point, i, x[i]);
+        double size = state_size(engine, point, i, x[i]);
+        /* What may be all rounding counts as large. */
+        bool rounding = engine->model->nominals[i] <= 0.0 && size < engine->model->scales.rounding_level * largest;
+        moved[i] = x[i] + border * sign * weight * (rounding ? largest : size);
     }
     return fabs(trial_margin(engine, t, moved, point->z) - here);
 }
