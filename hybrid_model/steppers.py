@@ -13,7 +13,7 @@ from hybrid_model.errors import HybridModelError, SimulationError
 from hybrid_model.flow_piece import FlowPiece, straight_piece
 from hybrid_model.layout import not_finite
 from hybrid_model.locate import SMALLEST
-from hybrid_model.scales import ABSOLUTE, ulp, tolerance_sizes
+from hybrid_model.scales import ABSOLUTE, tolerance_sizes, ulp
 from hybrid_model.variables import FloatArray, Kind
 
 if TYPE_CHECKING:
