@@ -180,7 +180,10 @@ def _stateless_steps(execution: Execution, end: float) -> Any:
 
 
 def _failure(execution: Execution, flow_map: FlowMap, t: float, x: FloatArray, problem: str | None) -> str:
-    why = problem
+    why = (
+        f"no step meets the tolerances ({str(problem).rstrip('.')}); where the flow map jumps, let a jump or a time "
+        "event happen, and where an input jumps, give it as a Signal with its breakpoints"
+    )
     if flow_map.trouble:
         why = f"{flow_map.trouble}; the flow map must give finite numbers in the flow set"
         if execution.automaton.has_flow_set or execution.guards:

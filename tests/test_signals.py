@@ -133,3 +133,16 @@ def test_a_pulse_with_breakpoints_is_not_stepped_over():
 
     options = {"u": hm.Signal(pulse, [50.0, 50.1])}
     assert hm.simulate(Plant(), 100.0, inputs=options).end.x == pytest.approx(0.1, abs=1e-12)
+
+
+def test_a_jump_that_no_step_crosses_names_the_remedy():
+    with pytest.raises(
+        hm.SimulationError, match=r"cannot go on at t = 50 s .* give it as a Signal with its breakpoints\.$"
+    ):
+        hm.simulate(
+            Plant(),
+            52.0,
+            t_start=48.0,
+            inputs={"u": lambda t: 1.0 if 50.0 <= t < 50.1 else 0.0},
+            solver=hm.Solver(max_step=0.09),
+        )
