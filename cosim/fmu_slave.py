@@ -14,11 +14,10 @@ from cosim.fmu_instance import FmuInstance
 from cosim.fmu_variables import STRUCTURAL, FmuVariables
 from cosim.slave import Slave, Step, Update, Value
 from fmu.importer.values import UnfitError, exact, parsed, require_within
+from hybrid_model.scales import ROUNDINGS
 
 MAX_PARTS = 10_000
 """Most early returns without an event within one step."""
-ROUNDINGS = 8.0
-"""Times that differ by no more ulp are one: 3 * 0.1 and 0.3."""
 
 
 class FmuSlave(Slave):

@@ -25,6 +25,7 @@ from hybrid_model.signals import InputValue
 from hybrid_model.verify_flow import FlowCheck
 from hybrid_model.verify_jump import JumpCheck
 from hybrid_model.verify_report import Findings, Verification
+from hybrid_model.verify_slack import Slack
 from hybrid_model.verify_subject import Subject, Tolerances
 
 
@@ -86,15 +87,16 @@ def verify(
         )
     subject = Subject(automaton, data, inputs)
     tolerances = tolerances or Tolerances()
+    slack = Slack(subject, tolerances)
     findings = Findings(subject.samples)
     usable = _finite(subject, findings)
     _hybrid_time(subject.samples, findings)
     flows = list(_flows(subject.samples, usable))
-    flow_check = FlowCheck(subject, tolerances, findings, method)
+    flow_check = FlowCheck(subject, slack, tolerances.rtol, findings, method)
     for first, last in flows:
         flow_check.check(first, last)
     jumps = np.flatnonzero((np.diff(subject.samples.j) == 1) & usable[:-1] & usable[1:])
-    jump_check = JumpCheck(subject, tolerances, findings)
+    jump_check = JumpCheck(subject, slack, tolerances.rtol, findings)
     for k in jumps:
         jump_check.check(int(k))
     lengths = [subject.samples.t[last] - subject.samples.t[first] for first, last in flows]

@@ -14,7 +14,8 @@ from hybrid_model.errors import SimulationError
 from hybrid_model.transitions import Priority
 from hybrid_model.variables import FloatArray
 from hybrid_model.verify_report import Findings
-from hybrid_model.verify_subject import Subject, Tolerances
+from hybrid_model.verify_slack import Slack
+from hybrid_model.verify_subject import Subject
 
 METHODS = ("RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA")
 """Integrators of ``scipy.integrate.solve_ivp``."""
@@ -23,7 +24,7 @@ BETWEEN = 9
 INTEGRATION = 1e-4
 """Tolerance of the integration as a part of that of the comparison, so that its error does not count."""
 EXPLICIT_STEP = 1e-10
-"""Flows shorter than this part of t (of 1 s) are one Euler step: its error is of the square of that."""
+"""Flows shorter than this part of the data are one Euler step: its error is of the square of that."""
 
 Path = Callable[[float], FloatArray]
 
@@ -39,8 +40,10 @@ class FlowCheck:
     ----------
     subject : Subject
         Automaton and samples.
-    tolerances : Tolerances
-        What counts as equal.
+    slack : Slack
+        How far samples may be from an exact run.
+    rtol : float
+        Relative tolerance of states.
     findings : Findings
         Where violations go.
     method : str
@@ -52,11 +55,11 @@ class FlowCheck:
         If the method is none of these.
     """
 
-    def __init__(self, subject: Subject, tolerances: Tolerances, findings: Findings, method: str) -> None:
+    def __init__(self, subject: Subject, slack: Slack, rtol: float, findings: Findings, method: str) -> None:
         if method not in METHODS:
             raise SimulationError(f"verify was given method = {method!r}: the methods are {', '.join(METHODS)}.")
         self._subject = subject
-        self._tolerances = tolerances
+        self._slack, self._rtol = slack, rtol
         self._findings = findings
         self._method = method
         automaton = subject.automaton
@@ -94,7 +97,7 @@ class FlowCheck:
         end = self._subject.samples.t[k + 1]
         for index, time in zip(self._subject.timed, self._subject.event_times(k), strict=True):
             # Written so that a time that is not a number is reported as well.
-            if not time >= end - self._tolerances.time:
+            if not time >= end - self._slack.time:
                 name = self._subject.automaton.jumps[index].name
                 self._findings.add(
                     k + 1, 5, f"time event {name}", f"time event {name!r} was due at {time:.9g} s and is passed by."
@@ -105,9 +108,14 @@ class FlowCheck:
         row = [-self._subject.flow_margin(t, x, k)]
         return np.array([*row, *self._subject.jump_margins(t, x, k)] if self._guards else row)
 
-    def _report_sets(self, k: int, t: float, badness: FloatArray) -> None:
+    def _allowed(self, t: float, x: FloatArray, k: int) -> FloatArray:
+        return self._slack.of_margins(lambda moved: self._badness(t, moved, k), x)
+
+    def _report_sets(self, k: int, t: float, x: FloatArray, badness: FloatArray) -> None:
+        if np.all(badness <= 0.0):
+            return
         # Written so that a margin that is not a number is reported as well.
-        for row in np.flatnonzero(~(badness <= self._tolerances.atol)):
+        for row in np.flatnonzero(~(badness <= self._allowed(t, x, k))):
             if row == 0:
                 self._findings.add(
                     k, 2, "flow set", f"the flow is outside the flow set at t = {t:.9g} s: margin {-badness[0]:.3g}."
@@ -123,12 +131,12 @@ class FlowCheck:
 
     def _sets_at(self, k: int, *, flows_on: bool) -> None:
         """Check a sample of a flow; a time tolerance to either side, what is bad must be bad throughout."""
-        rows = np.array([self._badness(*point, k) for point in nearby(self._subject, k, self._tolerances.time)])
+        rows = np.array([self._badness(*point, k) for point in nearby(self._subject, k, self._slack.time)])
         badness = np.min(rows, axis=0)
         if not flows_on:
             # The last sample of a flow may lie in the jump set.
             badness[1:] = -math.inf
-        self._report_sets(k, float(self._subject.samples.t[k]), badness)
+        self._report_sets(k, float(self._subject.samples.t[k]), self._subject.x[k], badness)
 
     def _along(self, first: int, last: int) -> None:
         """Integrate along the flow; from the first sample on that does not fit, from each sample to the next.
@@ -154,7 +162,7 @@ class FlowCheck:
 
     def _arrives(self, k: int, path: Path, *, report: bool = False) -> bool:
         found, expected = self._subject.x[k], path(float(self._subject.samples.t[k]))
-        allowed = self._tolerances.atol + self._tolerances.rtol * np.maximum(np.abs(found), np.abs(expected))
+        allowed = self._slack.states + self._rtol * np.maximum(np.abs(found), np.abs(expected))
         wrong = np.flatnonzero(~(np.abs(found - expected) <= allowed))
         if wrong.size and report:
             i = wrong[np.argmax(np.abs(found - expected)[wrong] / allowed[wrong])]
@@ -170,7 +178,7 @@ class FlowCheck:
     def _between(self, k: int, path: Path) -> None:
         """Check the sets between two samples, also where a margin peaks between the points that are looked at."""
         t0, t1 = (float(t) for t in self._subject.samples.t[k : k + 2])
-        margin = self._tolerances.time
+        margin = self._slack.time
         if t1 - t0 <= 4.0 * margin or not (self._guards or self._subject.automaton.has_flow_set):
             return
         times = np.linspace(t0 + margin, t1 - margin, BETWEEN)
@@ -181,7 +189,7 @@ class FlowCheck:
     def _report_worst(self, k: int, times: FloatArray, badness: FloatArray, row: int, path: Path) -> None:
         top = int(np.argmax(badness))
         t, worst = float(times[top]), badness[top]
-        if 0 < top < len(times) - 1 and math.isfinite(worst) and worst <= self._tolerances.atol:
+        if 0 < top < len(times) - 1 and math.isfinite(worst) and worst <= self._allowed(t, path(t), k)[row]:
             fall = worst - min(badness[top - 1], badness[top + 1])
             # The peak of a parabola through the three lies above by less than a quarter of the fall.
             if worst + fall > 0.0:
@@ -189,12 +197,12 @@ class FlowCheck:
                     lambda time: -self._badness(float(time), path(float(time)), k)[row],
                     bounds=(times[top - 1], times[top + 1]),
                     method="bounded",
-                    options={"xatol": self._tolerances.time},
+                    options={"xatol": self._slack.time},
                 )
                 t, worst = float(found.x), max(worst, -float(found.fun))
         full = np.full(1 + len(self._guards), -math.inf)
         full[row] = worst
-        self._report_sets(k, t, full)
+        self._report_sets(k, t, path(t), full)
 
     def _path(self, first: int, last: int) -> Path:
         """Integrate from one sample to another, never across a breakpoint of an input."""
@@ -227,10 +235,10 @@ class FlowCheck:
 
         if len(x) == 0:
             return lambda t: x
-        if b - a <= EXPLICIT_STEP * max(1.0, abs(a)):
+        if b - a <= EXPLICIT_STEP * self._slack.length or b - a <= 64.0 * math.ulp(a):
             slope = rates(a, x)
             return lambda t: x + (t - a) * slope
-        options = {"rtol": max(INTEGRATION * self._tolerances.rtol, 3e-14), "atol": INTEGRATION * self._tolerances.atol}
+        options = {"rtol": max(INTEGRATION * self._rtol, 3e-14), "atol": INTEGRATION * self._slack.states}
         solution = solve_ivp(rates, (a, b), x, method=self._method, dense_output=True, **options)
         if solution.status != 0:
             raise FlowMapError(f"{self._method} cannot follow the flow map from t = {a:.9g} s: {solution.message}")

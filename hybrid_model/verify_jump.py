@@ -8,7 +8,8 @@ from hybrid_model.transitions import Priority, Trigger
 from hybrid_model.variables import FloatArray
 from hybrid_model.verify_flow import nearby
 from hybrid_model.verify_report import Findings
-from hybrid_model.verify_subject import Subject, Tolerances
+from hybrid_model.verify_slack import Slack
+from hybrid_model.verify_subject import Subject
 
 
 class JumpCheck:
@@ -18,15 +19,17 @@ class JumpCheck:
     ----------
     subject : Subject
         Automaton and samples.
-    tolerances : Tolerances
-        What counts as equal.
+    slack : Slack
+        How far samples may be from an exact run.
+    rtol : float
+        Relative tolerance of states.
     findings : Findings
         Where violations go.
     """
 
-    def __init__(self, subject: Subject, tolerances: Tolerances, findings: Findings) -> None:
+    def __init__(self, subject: Subject, slack: Slack, rtol: float, findings: Findings) -> None:
         self._subject = subject
-        self._tolerances = tolerances
+        self._slack, self._rtol = slack, rtol
         self._findings = findings
 
     def check(self, k: int) -> None:
@@ -55,15 +58,17 @@ class JumpCheck:
         """Return for each jump its margin (for time events the time in s since it was due), and whether it was due
         within the tolerances, and beyond doubt.
         """
-        subject, tolerances = self._subject, self._tolerances
-        rows = np.array([subject.jump_margins(*point, k) for point in nearby(subject, k, tolerances.time)])
+        subject, slack = self._subject, self._slack
+        rows = np.array([subject.jump_margins(*point, k) for point in nearby(subject, k, slack.time)])
+        t = float(subject.samples.t[k])
+        allowed = slack.of_margins(lambda x: subject.jump_margins(t, x, k), subject.x[k])
         found: list[tuple[float, bool, bool]] = [(0.0, False, False)] * len(subject.automaton.jumps)
-        for index, column in zip(subject.guards, rows.T, strict=True):
-            due = bool(np.max(column) >= -tolerances.atol)
-            found[index] = float(column[0]), due, bool(np.min(column) > tolerances.atol)
+        for index, column, within in zip(subject.guards, rows.T, allowed, strict=True):
+            due = bool(np.max(column) >= -within)
+            found[index] = float(column[0]), due, bool(np.min(column) > within)
         for index, time in zip(subject.timed, subject.event_times(k), strict=True):
             since = float(subject.samples.t[k] - time)
-            found[index] = since, since >= -tolerances.time, since >= 0.0
+            found[index] = since, since >= -slack.time, since >= 0.0
         return found
 
     def _difference(self, index: int, k: int) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -71,7 +76,7 @@ class JumpCheck:
         subject = self._subject
         expected = subject.reset(index, k)
         found = np.concatenate([subject.x[k + 1], subject.z[k + 1]])
-        allowed = self._tolerances.atol + self._tolerances.rtol * np.maximum(np.abs(found), np.abs(expected))
+        allowed = self._slack.all_states + self._rtol * np.maximum(np.abs(found), np.abs(expected))
         return expected, found, allowed
 
     def _lands(self, index: int, k: int) -> bool:
@@ -107,8 +112,10 @@ class JumpCheck:
         subject = self._subject
         if subject.automaton.priority is not Priority.FLOW:
             return
-        margins = [subject.flow_margin(*point, k) for point in nearby(subject, k, self._tolerances.time)]
-        if min(margins) > self._tolerances.atol:
+        margins = [subject.flow_margin(*point, k) for point in nearby(subject, k, self._slack.time)]
+        t = float(subject.samples.t[k])
+        allowed = self._slack.of_margins(lambda x: np.array([subject.flow_margin(t, x, k)]), subject.x[k])
+        if min(margins) > allowed[0]:
             self._findings.add(
                 k,
                 2,

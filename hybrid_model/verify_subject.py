@@ -29,11 +29,14 @@ class Tolerances(ExplainedCall):
 
     Attributes
     ----------
-    time : float
-        In s: an event may lie so far from its exact time.
-    rtol, atol : float
+    time : float, optional
+        In s: an event may lie so far from its exact time. Default: 1e-8 of the length of the data.
+    rtol : float
+        Relative tolerance of values.
+    atol : float, optional
         A value may differ from the one recomputed by ``atol + rtol |value|``, in the variable's unit; a margin may be
-        on the wrong side of zero by `atol`, in the margin's unit.
+        on the wrong side of zero by `atol`, in the margin's unit. Default: 1e-9 of each state's nominal value, else of
+        its largest in the data; for a margin, what it changes when states move by that.
 
     Raises
     ------
@@ -41,13 +44,15 @@ class Tolerances(ExplainedCall):
         If a number is not positive and finite.
     """
 
-    time: float = 1e-8
+    time: float | None = None
     rtol: float = 1e-8
-    atol: float = 1e-9
+    atol: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("time", "rtol", "atol"):
             given = getattr(self, name)
+            if given is None and name != "rtol":
+                continue
             if not (is_real(given) and 0.0 < given < math.inf):
                 raise DataError(f"tolerance {name} = {told(given)}: give a positive number.")
 

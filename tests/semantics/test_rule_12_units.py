@@ -193,3 +193,24 @@ def test_events_a_microsecond_apart_after_a_quiet_hour_stay_apart():
     assert len(gaps) == 10
     # 16 ulp of 3600 s.
     assert gaps == pytest.approx(np.full(10, 1e-6), abs=16 * np.spacing(3600.0))
+
+
+@pytest.mark.parametrize("f", [1e-9, 1.0, 1e9])
+def test_a_run_is_verified_at_any_frequency_and_what_is_wrong_is_seen(f):
+    arc = hm.simulate(Sawtooth(f=f), 10.5 / f)
+    assert hm.verify(Sawtooth(f=f), arc).ok
+    # The flow map of a frequency that is off by a millionth, and a jump a thousandth of a period too early.
+    assert not hm.verify(Sawtooth(f=f * (1.0 + 1e-6)), arc).ok
+    early = hm.Samples(
+        [0.0, 0.999 / f, 0.999 / f, 1.5 / f], [0, 0, 1, 1], {"x": [0.0, 0.999, -0.001, 0.5], "n": [0, 0, 1, 1]}
+    )
+    assert any("none was due" in str(violation) for violation in hm.verify(Sawtooth(f=f), early).violations)
+
+
+@pytest.mark.parametrize("size", [1e-20, 1.0, 1e20])
+def test_a_run_of_any_size_is_verified_and_what_is_wrong_is_seen(size):
+    arc = hm.simulate(Ring(size=size), 20.0)
+    assert hm.verify(Ring(size=size), arc).ok
+    samples = arc.samples()
+    samples.values["x"][5] += 1e-5 * size
+    assert not hm.verify(Ring(size=size), samples).ok
