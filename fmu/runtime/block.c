@@ -116,6 +116,7 @@ static size_t lay_out_block(Engine *engine, unsigned char *memory)
     engine->p = take(&cursor, m->n_parameters * sizeof(double));
     engine->history = take(&cursor, m->n_jumps * sizeof(JumpHistory));
     engine->ticked = take(&cursor, m->n_clocks);
+    engine->inner_rates = take(&cursor, m->n_states * sizeof(double));
     for (size_t i = 0; i < N_SEGMENT; i++)
         engine->segment[i] = take(&cursor, m->n_states * sizeof(double));
     return cursor.used;
@@ -288,5 +289,6 @@ bool engine_block_is_sound(const Engine *engine, void *block)
     for (size_t j = 0; j < m->n_jumps; j++)
         sound = sound && other.history[j].stored <= N_ZENO_TIMES;
     return sound && point_is_sound(m, &other.live) && point_is_sound(m, &other.predicted) &&
-           all_finite(other.u, m->n_inputs) && all_finite(other.p, m->n_parameters) && segment_is_sound(&other);
+           all_finite(other.u, m->n_inputs) && all_finite(other.p, m->n_parameters) && all_finite(other.inner_rates, m->n_states) &&
+           segment_is_sound(&other);
 }

@@ -38,6 +38,14 @@ Answer instance_set_states(void *handle, const char *function, const double x[],
     return ANSWER_OK;
 }
 
+static bool all_finite(const double *values, size_t n)
+{
+    size_t i = 0;
+    while (i < n && isfinite(values[i]))
+        i++;
+    return i == n;
+}
+
 Answer instance_get_vector(void *handle, const char *function, Bank bank, double values[], size_t n)
 {
     Instance *instance = enter_kind(handle, function, MODEL_EXCHANGE, MODE_RUNNING);
@@ -50,6 +58,10 @@ Answer instance_get_vector(void *handle, const char *function, Bank bank, double
     const double *from = engine_values(engine, view_now(instance), bank);
     if (!from)
         return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+    if (bank == BANK_DERIVATIVE && !all_finite(from, n)) {
+        const double *outer = engine_outer_rates(engine, view_now(instance));
+        from = outer ? outer : from;
+    }
     for (size_t i = 0; i < n; i++)
         if (!isfinite(from[i])) {
             bool margin = bank == BANK_INDICATOR;

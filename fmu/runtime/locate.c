@@ -114,7 +114,10 @@ bool raise_levels_here(Engine *engine, const Point *point)
     const Model *m = engine->model;
     double now, t = *point->time, ahead = one_instant(engine, t), earlier = fmax(t - ahead, engine->status->start_time);
     note_sizes(engine, point);
-    if (!step_begin(engine, point) || !raise_guards(engine, point, *point->time))
+    /* An importer may locate an event a little behind its guard, where the flow map need not be defined. */
+    if (!step_begin(engine, point))
+        return true;
+    if (!raise_guards(engine, point, *point->time))
         return false;
     if (!m->flow_priority || !m->has_flow_set)
         return true;

@@ -82,6 +82,7 @@ typedef struct {
     /* The live point lies on a step of the solver that goes on to segment_end. */
     double segment_begin, segment_end;
     int32_t has_segment;
+    int32_t has_inner_rates;
     int32_t settled;              /* nothing has changed from outside since the last advance */
     int32_t prediction;
     int32_t ending;
@@ -101,6 +102,7 @@ struct Engine {
     JumpHistory *history;
     unsigned char *ticked;
     double *segment[N_SEGMENT];
+    double *inner_rates;          /* the last ones shown that were numbers */
     /* Scratch: nothing here outlives a call, except the cache of a view. */
     unsigned char *scratch;
     const double **arg;

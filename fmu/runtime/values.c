@@ -145,6 +145,29 @@ static bool indicators(Engine *engine)
            evaluate_view(engine, m->margins, "jump sets", engine->indicators, &engine->has_indicators);
 }
 
+/* Keeps rates that are numbers. */
+static const double *keep_rates(Engine *engine)
+{
+    size_t n = engine->model->n_states;
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(engine->rates[i]))
+            return engine->rates;
+    copy_values(engine->inner_rates, engine->rates, n);
+    engine->status->has_inner_rates = true;
+    return engine->rates;
+}
+
+const double *engine_outer_rates(Engine *engine, View view)
+{
+    const Model *m = engine->model;
+    double margin;
+    if (!engine->status->has_inner_rates || !m->has_flow_set || !hold_view(engine, view))
+        return NULL;
+    const Point *shown = &engine->shown;
+    bool outside = evaluate(engine, m->flow_set, *shown->time, shown->x, shown->z, &margin, NULL) && margin < 0.0;
+    return outside ? engine->inner_rates : NULL;
+}
+
 size_t engine_indicators(const Engine *engine)
 {
     return engine->model->n_margins + (engine->model->has_flow_set ? 1 : 0);
@@ -166,7 +189,7 @@ const double *engine_values(Engine *engine, View view, Bank bank)
     case BANK_STATE: return engine->shown.x;
     case BANK_DISCRETE: return engine->shown.z;
     case BANK_DERIVATIVE:
-        return evaluate_view(engine, m->flow, "flow map", engine->rates, &engine->has_rates) ? engine->rates : NULL;
+        return evaluate_view(engine, m->flow, "flow map", engine->rates, &engine->has_rates) ? keep_rates(engine) : NULL;
     case BANK_INDICATOR: return indicators(engine) ? engine->indicators : NULL;
     default:
         return evaluate_view(engine, m->outputs, "outputs", engine->outputs, &engine->has_outputs) ? engine->outputs

@@ -163,6 +163,18 @@ def test_an_fmu_reaches_a_guard_behind_which_its_flow_map_is_not_defined(fmi, ex
     assert found["h"][-1] == pytest.approx(LEFT, abs=1e-9)
 
 
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_an_importer_that_integrates_may_look_behind_the_guard(fmi, exported):
+    """Rates of the last point inside stand for those that the flow map does not have outside its flow set."""
+    path = str(exported(Emptying(), "emptying", fmi=fmi))
+    found = fmpy.simulate_fmu(
+        path, fmi_type="ModelExchange", stop_time=5.0, step_size=1e-3, output_interval=0.1, relative_tolerance=1e-9
+    )
+    assert found["n"][-1] == 5
+    # CVode's own error over five flows.
+    assert found["h"][-1] == pytest.approx(LEFT, abs=1e-5)
+
+
 def test_where_no_guard_is_near_the_message_names_the_remedy():
     class Leak(hm.HybridAutomaton):
         h = hm.State(1.0)
