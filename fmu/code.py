@@ -57,8 +57,18 @@ _MAPS = (
     *("forward", "reverse", "start_forward", "start_reverse"),
 )
 _SCALES = (
-    *("roundings", "instant", "instant_in_gap", "border", "absolute", "rounding_level", "probe", "overshoot"),
-    *("accumulation", "crowd", "resolved"),
+    *(
+        "roundings",
+        "instant",
+        "instant_in_gap",
+        "border",
+        "absolute",
+        "rounding_level",
+        "unknown",
+        "probe",
+        "overshoot",
+    ),
+    *("accumulation", "crowd", "resolved", "chatter", "pause"),
 )
 """As `ModelScales` has them; the numbers are those of `hybrid_model.scales`."""
 _PRELUDE = """\

@@ -7,6 +7,7 @@ lies behind the end is extrapolated from what lies before it. A look that fails 
 from __future__ import annotations
 
 import functools
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 
 ORDER = 7
 """Of the step that probes are a part of."""
+REACH_AT = (1e-3, 0.03, 0.3, 1.0)
+REACH_STEP = 1e-3
+"""Parts of a flow at which its rates are looked at, and of that time by which states are moved to see them turn."""
 
 
 def instant(execution: Execution, t: float) -> float:
@@ -46,8 +50,10 @@ def border(execution: Execution, t: float, x: FloatArray) -> float:
     """
     if execution.solver.event_tolerance is not None:
         return execution.solver.event_tolerance
-    u, sizes = execution.inputs.at(t), execution.sizes_with(x)
-    sizes = np.where(np.isnan(execution.nominal), usual_sizes(sizes), sizes)
+    u = execution.inputs.at(t)
+    # As large as the states are here: what they once were counts only where they may be rounding errors of that.
+    present = np.maximum(np.abs(execution.x), np.abs(x))
+    sizes = np.where(np.isnan(execution.nominal), usual_sizes(present, execution.sizes), execution.nominal)
     points = [x + move for move in moves(sizes)]
     rates = quiet_rates(execution, t, x)
     if np.isfinite(rates).all():
@@ -66,8 +72,8 @@ def quiet_rates(execution: Execution, t: float, x: FloatArray) -> FloatArray:
         return np.full(x.shape, np.nan)
 
 
-def extrapolated(execution: Execution, rates: FloatArray) -> FloatArray | None:
-    """Return the margins one instant after the present point, seen from one instant before it.
+def one_instant_on(execution: Execution, rates: FloatArray) -> FloatArray | None:
+    """Return the margins one instant after the present point; past the end of the run time itself stands still.
 
     Parameters
     ----------
@@ -83,14 +89,17 @@ def extrapolated(execution: Execution, rates: FloatArray) -> FloatArray | None:
     """
     t, x = execution.t, execution.x
     ahead = instant(execution, t)
-    before = max(t - ahead, execution.t_start)
-    if not before < t:
-        return None
-    # An input that changes by a jump here would look like a slope.
+    soon = min(t + ahead, execution.t_stop)
+    # An input that changes by a jump meanwhile is another flow's.
+    u = execution.inputs.at(t if execution.inputs.next_breakpoint(t) <= soon else soon)
+    then = look(execution, soon, x + ahead * rates, u)
+    before = max(t - (t + ahead - soon), execution.t_start)
+    if then is None or soon == t + ahead or not before < t:
+        return then
+    # What time alone changes goes on as it did.
     u = execution.inputs.at(t if execution.inputs.next_breakpoint(before) <= t else before)
-    earlier = look(execution, before, x - (t - before) * rates, u)
-    now = execution.margins(t, x)
-    return None if earlier is None else now + (now - earlier) * (ahead / (t - before))
+    earlier = look(execution, before, x, u)
+    return None if earlier is None else then + execution.margins(t, x) - earlier
 
 
 def leads_out(execution: Execution) -> bool:
@@ -116,6 +125,26 @@ def step_from(execution: Execution, end: float) -> float:
     """Return the length of a first step from the present point, not beyond `end`."""
     if not end > execution.t:
         return end - execution.t_start
-    size = float(execution.sizes.max(initial=0.0))
+    size = max(float(execution.sizes.max(initial=0.0)), execution.floor)
     rates_at = functools.partial(quiet_rates, execution)
     return first_step(rates_at, execution.t, execution.x, end, size=size, rtol=execution.solver.rtol, order=ORDER)
+
+
+def reach(execution: Execution, end: float) -> float:
+    """Return how far a flow to `end` may lead: the size of states that have shown none so far.
+
+    Looked at with the states as they are, at a few times; where the flow turns back by itself, up to there.
+    """
+    t, x = execution.t, execution.x
+    found = 0.0
+    for part in REACH_AT:
+        span = part * (end - t)
+        rates = quiet_rates(execution, t + span, x)
+        speed = float(np.abs(rates).max(initial=0.0))
+        if not (math.isfinite(span) and 0.0 < speed < math.inf):
+            continue
+        step = REACH_STEP * span
+        change = float(np.abs(quiet_rates(execution, t + span, x + step * rates) - rates).max())
+        turned = change / (speed * step)
+        found = max(found, speed * (min(span, 1.0 / turned) if turned > 0.0 else span))
+    return found

@@ -84,6 +84,8 @@ class Execution:
         Time in s of the last jump that is no breakpoint; at first the start time.
     sizes : ndarray
         Usual size of each continuous state: the nominal value, or the largest that the run has shown.
+    floor : float
+        Size that all states have at least, where they have shown none by themselves.
     guards : int
         Number of jumps on state.
     levels : ndarray
@@ -132,6 +134,7 @@ class Execution:
             or [np.zeros(0)]
         )
         self.sizes = np.zeros(self.x.size)
+        self.floor = 0.0
         self.levels = self._zero_levels()
         self.compute_start()
 

@@ -71,5 +71,5 @@ def first_step(
         return euler
     # The error of a step h is about speed h (turned h)^order; it is to be a hundredth of the tolerance.
     allowed = PART * rtol * max(size, speed * euler) / speed
-    chosen = (allowed / turned**order) ** (1.0 / (order + 1)) if turned > 0.0 else math.inf
+    chosen = (allowed * turned) ** (1.0 / (order + 1)) / turned if turned > 0.0 else math.inf
     return max(least, min(GROWTH * euler, chosen, whole))

@@ -26,7 +26,7 @@ NOISE = 1e-15
 """The same, where only rounding is meant: under flow priority a flow set is left beyond it."""
 ABSOLUTE = 1e-15
 """Absolute tolerance of a step, as a part of the usual size of a state."""
-ROUNDING_LEVEL = 1e-12
+ROUNDING_LEVEL = 3e-14
 """A state below this part of the largest one may be rounding: no digit of it is to be had."""
 PROBE = 1e-6
 """Where a flow leads from a border is looked at after this part of a step of the solver."""
@@ -37,7 +37,11 @@ ACCUMULATION = 1e-6
 CROWD = 1e-6
 """Jumps crowd if many of them, at shrinking gaps, come within this part of the longest gap."""
 RESOLVED = 1e4
-"""In ulp: gaps below have ratios that rounding blurs; jumps at such gaps are an accumulation."""
+"""In ulp: gaps below have ratios that rounding blurs, so a geometric series is judged before."""
+CHATTER = 32.0
+"""In ulp: jumps at gaps below are no events in time any more."""
+PAUSE = 1e-4
+"""A gap that is below this part of the one before does not continue it: what was before is a pause."""
 
 
 def ulp(t: float) -> float:
@@ -63,19 +67,25 @@ def one_instant(t: float, t_start: float, t_last: float) -> float:
     return max(ROUNDINGS * ulp(t), min(INSTANT * (t - t_start), INSTANT_IN_GAP * (t - t_last)))
 
 
-def usual_sizes(sizes: FloatArray) -> FloatArray:
+UNKNOWN = 1e-6
+"""States below this part of where their flow may lead have shown no size yet."""
+
+
+def usual_sizes(sizes: FloatArray, history: FloatArray) -> FloatArray:
     """Return the sizes of states of which borders are parts: their own, but what may be all rounding counts as large.
 
     Parameters
     ----------
     sizes : ndarray, shape (n,)
+        The states' own sizes.
+    history : ndarray, shape (n,)
         Largest value of each state so far.
 
     Returns
     -------
     ndarray, shape (n,)
     """
-    largest = float(sizes.max(initial=0.0))
+    largest = float(history.max(initial=0.0))
     return np.where(sizes < ROUNDING_LEVEL * largest, largest, sizes)
 
 
@@ -83,7 +93,8 @@ def tolerance_sizes(sizes: FloatArray) -> FloatArray:
     """Return the sizes of states of which absolute tolerances are parts.
 
     They lie between a state's usual size and the largest one, by the geometric mean: the digits of a small state count,
-    but not those that rounding errors of the large states leave no more.
+    but not those that rounding errors of the large states leave no more. None is above one, so that large states never
+    cost small ones their digits.
 
     Parameters
     ----------
@@ -94,8 +105,8 @@ def tolerance_sizes(sizes: FloatArray) -> FloatArray:
     -------
     ndarray, shape (n,)
     """
-    usual = usual_sizes(sizes)
-    return np.sqrt(usual) * math.sqrt(usual.max())
+    usual = usual_sizes(sizes, sizes)
+    return np.minimum(np.sqrt(usual) * math.sqrt(usual.max()), 1.0)
 
 
 def moves(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid_model.borders import step_from
+from hybrid_model.borders import reach, step_from
 from hybrid_model.errors import HybridModelError, SimulationError
 from hybrid_model.flow_piece import FlowPiece, straight_piece
 from hybrid_model.layout import not_finite
 from hybrid_model.locate import SMALLEST
-from hybrid_model.scales import ABSOLUTE, tolerance_sizes, ulp
+from hybrid_model.scales import ABSOLUTE, UNKNOWN, tolerance_sizes, ulp
 from hybrid_model.variables import FloatArray, Kind
 
 if TYPE_CHECKING:
@@ -90,6 +90,8 @@ def steps(execution: Execution, end: float) -> Any:
     flow_map(execution.t, execution.x)
     if flow_map.trouble:
         raise SimulationError(_failure(execution, flow_map, execution.t, execution.x, None))
+    if execution.t == execution.t_start or execution.sizes.max() == 0.0:
+        _raise_floor(execution, end)
     first = min(execution.next_step or step_from(execution, end), options.max_step, end - execution.t)
     stepper = _stepper(execution, flow_map, end, first)
     pace = Pace(execution, end)
@@ -109,6 +111,9 @@ def steps(execution: Execution, end: float) -> Any:
             continue
         # LSODA calls a step done that went nowhere.
         if stepper.status == "failed" or not stepper.t > t0:
+            if not flow_map.trouble and _raise_floor(execution, end):
+                stepper = _stepper(execution, flow_map, end, min(step_from(execution, end), options.max_step))
+                continue
             kind = StuckError if flow_map.trouble else SimulationError
             raise kind(_failure(execution, flow_map, t0, x0, problem or "the step length fell to zero"))
         execution.next_step = getattr(stepper, "h_abs", None)
@@ -133,16 +138,26 @@ def _stepper(execution: Execution, flow_map: FlowMap, end: float, first: float) 
     )
 
 
-def _absolute_tolerance(execution: Execution, reach: float) -> FloatArray:
+def _raise_floor(execution: Execution, end: float) -> bool:
+    """Give states that are far below where the flow may lead a size of that; return whether they got one."""
+    found = reach(execution, end)
+    if not max(float(execution.sizes.max()), execution.floor) < UNKNOWN * found:
+        return False
+    execution.floor = found
+    return True
+
+
+def _absolute_tolerance(execution: Execution, first_reach: float) -> FloatArray:
     """Return the absolute tolerance of each state: a part of its nominal value, else of its usual size.
 
-    `reach` is how far the first step leads: states that start at zero have no size yet.
+    `first_reach` is how far the first step leads: states that start at zero have no size yet.
     """
     if execution.solver.atol is not None:
         return np.full(execution.x.shape, execution.solver.atol)
     sizes = execution.sizes
-    if reach > sizes.max():
-        sizes = np.maximum(sizes, reach)
+    if first_reach > sizes.max():
+        sizes = np.maximum(sizes, first_reach)
+    sizes = np.maximum(sizes, execution.floor)
     usual = tolerance_sizes(np.maximum(sizes, SMALLEST / ABSOLUTE))
     return ABSOLUTE * np.where(np.isnan(execution.nominal), usual, execution.nominal)
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid_model.borders import border, extrapolated, instant, look, quiet_rates
+from hybrid_model.borders import border, instant, look, one_instant_on, quiet_rates
 from hybrid_model.flow_piece import FlowPiece, straight_piece
 from hybrid_model.locate import DEGREE, SMALLEST, MarginAtTimes, first_nonnegative, first_rise, may_rise, scan_times
 from hybrid_model.scales import BORDER, NOISE, OVERSHOOT, ulp
@@ -153,7 +153,7 @@ class Watch:
         execution = self._execution
         if self._guards == 0 or len(self._watched) == 0 or self._watched[0] >= self._guards:
             return
-        then = extrapolated(execution, FlowMap(execution, piece.t1)(piece.t1, piece.x1))
+        then = one_instant_on(execution, FlowMap(execution, piece.t1)(piece.t1, piece.x1))
         if then is not None:
             now = self._margins(piece.t1, piece.x1)[: self._guards]
             execution.levels = np.where((now < 0.0) & (then[: self._guards] >= 0.0), now, 0.0)
@@ -166,7 +166,7 @@ class Watch:
         execution = self._execution
         t, x = execution.t, execution.x
         rates, reach = quiet_rates(execution, t, x), min(OVERSHOOT * ulp(t), end - t)
-        then = extrapolated(execution, rates)
+        then = one_instant_on(execution, rates)
         if self._guards == 0 or self._flow_first or then is None or not np.isfinite(rates).all():
             return None
         now = execution.margins(t, x)[: self._guards]

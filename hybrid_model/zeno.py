@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybrid_model.errors import SimulationError
-from hybrid_model.scales import ACCUMULATION, CROWD, RESOLVED, ulp
+from hybrid_model.scales import ACCUMULATION, CHATTER, CROWD, PAUSE, RESOLVED, ulp
 
 HISTORY = 12
 SHRINKS = 0.999
@@ -137,12 +137,13 @@ class ZenoMonitor:
 
     def _measure(self, jump: str, recent: deque[float], t: float) -> None:
         """Keep the longest gap between jumps of a name, and the first one of those that shrink."""
-        if not recent:
+        if not recent or t == recent[-1]:
             return
         gap = t - recent[-1]
         before = recent[-1] - recent[-2] if len(recent) > 1 else math.inf
-        self._longest[jump] = max(self._longest.get(jump, 0.0), gap)
-        if not gap < before:
+        after_pause = gap < PAUSE * before
+        self._longest[jump] = gap if after_pause else max(self._longest.get(jump, 0.0), gap)
+        if after_pause or not gap < before:
             self._shrinking_from[jump] = gap
         self._shrinking_from.setdefault(jump, gap)
 
@@ -155,7 +156,7 @@ class ZenoMonitor:
             crowded = span <= self.guard.window
         else:
             shrink = recent[-1] - recent[-2] < SHRINKS * (recent[-n + 1] - recent[-n])
-            crowded = (shrink and span <= CROWD * self._longest[jump]) or span <= n * RESOLVED * ulp(recent[-1])
+            crowded = (shrink and span <= CROWD * self._longest[jump]) or span <= n * CHATTER * ulp(recent[-1])
         if not crowded:
             return None
         return (

@@ -285,6 +285,7 @@ bool engine_block_is_sound(const Engine *engine, void *block)
                  memchr(status->message, '\0', sizeof status->message) != NULL &&
                  status->relative_tolerance >= RELATIVE_TOLERANCE &&
                  status->relative_tolerance <= RELATIVE_TOLERANCE_MOST && isfinite(status->start_time) &&
+                 status->floor >= 0.0 && isfinite(status->floor) &&
                  !isnan(status->stop_time) && isfinite(status->jumps_time);
     for (size_t j = 0; j < m->n_jumps; j++)
         sound = sound && other.history[j].stored <= N_ZENO_TIMES;

@@ -48,6 +48,8 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
     clear_levels(engine, point);
     if (!step_begin(engine, point) || (locate && !flow_may_begin(engine, point, &level)))
         return FLOW_PROBLEM;
+    if (*point->time == engine->status->start_time || largest_state(engine, point, point->x) <= DBL_MIN / engine->model->scales.absolute)
+        raise_floor(engine, point, end);
     while (*point->time < end) {
         if (*budget == 0)
             return FLOW_BUDGET;

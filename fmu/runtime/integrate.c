@@ -32,6 +32,7 @@ static const double DENSE_WEIGHT[N_STAGES] = {-12715105075.0 / 11282082432.0, 0.
 #define EULER_PART 0.01
 #define BLIND_PART 1e-3
 #define FIRST_GROWTH 100.0
+#define REACH_STEP 1e-3
 
 double time_ulp(double t)
 {
@@ -84,14 +85,14 @@ static double scale(const Engine *engine, const Point *point, size_t i, double s
     const Status *status = engine->status;
     const ModelScales *scales = &engine->model->scales;
     double nominal = engine->model->nominals[i], looser = status->relative_tolerance / RELATIVE_TOLERANCE;
-    double part = fmax(point->size[i], size) / engine->largest;
+    double part = fmax(status->floor, fmax(point->size[i], size)) / engine->largest;
     double usual = engine->largest * (part < scales->rounding_level ? 1.0 : sqrt(part));
-    return scales->absolute * looser * (nominal > 0.0 ? nominal : usual) + status->relative_tolerance * size;
+    return scales->absolute * looser * (nominal > 0.0 ? nominal : fmin(usual, 1.0)) + status->relative_tolerance * size;
 }
 
 double largest_state(const Engine *engine, const Point *point, const double *x)
 {
-    double largest = DBL_MIN / engine->model->scales.absolute;
+    double largest = fmax(DBL_MIN / engine->model->scales.absolute, engine->status->floor);
     for (size_t i = 0; i < engine->model->n_states; i++)
         largest = fmax(largest, state_size(engine, point, i, x[i]));
     return largest;
@@ -130,6 +131,40 @@ static double largest_of(size_t n, const double *values, const double *minus)
     return largest;
 }
 
+/* The speed of the flow at a time with the states as they are, and in *turned how fast it turns back by itself (1/s). */
+static double speed_at(Engine *engine, const Point *point, double t, double step, double *turned)
+{
+    size_t n = engine->model->n_states;
+    double *rates = engine->probe_k[1], *after = engine->probe_k[2], *moved = engine->probe_x;
+    if (!derivative(engine, t, point->x, point->z, rates))
+        return 0.0;
+    double speed = largest_of(n, rates, NULL);
+    for (size_t i = 0; i < n; i++)
+        moved[i] = point->x[i] + step * rates[i];
+    if (!(speed > 0.0) || !isfinite(speed) || !derivative(engine, t, moved, point->z, after))
+        return 0.0;
+    *turned = largest_of(n, after, rates) / (speed * step);
+    return isfinite(*turned) ? speed : 0.0;
+}
+
+bool raise_floor(Engine *engine, const Point *point, double limit)
+{
+    const double parts[] = {1e-3, 0.03, 0.3, 1.0};   /* see reach in hybrid_model/borders.py */
+    Status *status = engine->status;
+    double turned, found = 0.0;
+    for (size_t i = 0; i < sizeof parts / sizeof *parts && engine->model->n_states > 0; i++) {
+        double span = parts[i] * (limit - *point->time);
+        if (!isfinite(span) || !(span > 0.0))
+            continue;
+        double speed = speed_at(engine, point, *point->time + span, REACH_STEP * span, &turned);
+        found = fmax(found, speed > 0.0 ? speed * (turned * span > 1.0 ? 1.0 / turned : span) : 0.0);
+    }
+    if (!(largest_state(engine, point, point->x) < engine->model->scales.unknown * found))
+        return false;
+    status->floor = found;
+    return true;
+}
+
 /* An Euler step shows how the derivative changes; the step is chosen so that its error is about the tolerance.  Only
    ratios occur, so that no unit matters: see hybrid_model/first_step.py. */
 bool first_step(Engine *engine, const Point *point, double limit, double *h)
@@ -153,7 +188,7 @@ bool first_step(Engine *engine, const Point *point, double limit, double *h)
         return true;
     double reach = fmax(known ? size : 0.0, speed * euler);
     double allowed = EULER_PART * engine->status->relative_tolerance * reach / speed;
-    double chosen = turned > 0.0 ? pow(allowed / pow(turned, ORDER), 1.0 / (ORDER + 1.0)) : (double)INFINITY;
+    double chosen = turned > 0.0 ? pow(allowed * turned, 1.0 / (ORDER + 1.0)) / turned : (double)INFINITY;
     *h = fmax(least, fmin(fmin(FIRST_GROWTH * euler, chosen), whole));
     return true;
 }
@@ -230,8 +265,12 @@ bool step_accept(Engine *engine, const Point *point, double limit)
         }
         h = used * (isfinite(error) ? fmax(0.1, 0.9 * pow(error, -0.2)) : 0.1);
         rejected = true;
-        if (h < 16.0 * time_ulp(t0) || t0 + h <= t0)
+        if (h >= 16.0 * time_ulp(t0) && t0 + h > t0)
+            continue;
+        if (!isfinite(error) || !raise_floor(engine, point, limit))
             return step_too_small(engine, point, h, isfinite(error));
+        if (!first_step(engine, point, limit, &h))
+            return false;
     }
 }
 

@@ -83,23 +83,54 @@ static FlowEnd leave_flow_set(Search *search, double t)
     return FLOW_PROBLEM;
 }
 
-/* Guards that are crossed within one instant after t count as crossed.  What lies behind t, which may be the end of
-   the run, is extrapolated from what lies before it. */
+/* The margins of the jumps one instant after x at t, in `then`; past the end of the run time itself stands still, and
+   what time alone changes goes on as it did.  False if they cannot be told. */
+static bool look_one_instant_on(Engine *engine, const Point *point, double t, const double *x, double *then)
+{
+    const Model *m = engine->model;
+    double ahead = one_instant(engine, t), soon = fmin(t + ahead, engine->status->stop_time);
+    double before = fmax(t - (t + ahead - soon), engine->status->start_time);
+    double *rates = engine->probe_k[1], *moved = engine->dense_x;
+    if (m->n_states > 0 && !evaluate(engine, m->flow, t, x, point->z, rates, NULL))
+        return false;
+    for (size_t i = 0; i < m->n_states; i++) {
+        moved[i] = x[i] + ahead * rates[i];
+        if (!isfinite(moved[i]))
+            return false;
+    }
+    if (!evaluate_margins(engine, soon, moved, point->z))
+        return false;
+    copy_values(then, engine->margins, m->n_margins);
+    if (soon >= t + ahead || !(before < t))
+        return true;
+    if (!evaluate_margins(engine, t, x, point->z))
+        return false;
+    for (size_t i = 0; i < m->n_margins; i++)
+        then[i] += engine->margins[i];
+    if (!evaluate_margins(engine, before, x, point->z))
+        return false;
+    for (size_t i = 0; i < m->n_margins; i++)
+        then[i] -= engine->margins[i];
+    return true;
+}
+
+/* Guards that are crossed within one instant after t count as crossed. */
 static bool raise_guards(Engine *engine, const Point *point, double t)
 {
     const Model *m = engine->model;
     Search search = {.engine = engine, .point = point, .level = 0.0, .piece_end = t,
                      .n_rows = m->n_margins + 1, .exit_row = m->n_margins, .failed = false};
-    double *now = engine->samples, *before = engine->samples + search.n_rows, ahead = one_instant(engine, t);
-    double earlier = fmax(t - ahead, engine->status->start_time), part = ahead / (t - earlier);
+    const Step *step = &engine->step;
+    double *now = engine->samples, *then = engine->samples + search.n_rows;
     if (m->n_margins == 0)
         return true;
     if (!look(&search, ON_STEP, t, now))
         return false;
-    if (!(earlier < t) || !try_to_look(&search, ON_STEP, earlier, before))
+    const double *x = t == step->t0 ? step->x0 : t == step->t1 ? step->x1 : engine->probe_x;
+    if (!look_one_instant_on(engine, point, t, x, then))
         return true;
     for (size_t row = 0; row < m->n_margins; row++)
-        if (engine->is_guard[row] && now[row] < 0.0 && now[row] + part * (now[row] - before[row]) >= 0.0)
+        if (engine->is_guard[row] && now[row] < 0.0 && then[row] >= 0.0)
             point->level[row] = now[row];
     return true;
 }

@@ -61,8 +61,8 @@ typedef struct {
 /* The numbers of the semantics, none of which is in seconds or in the unit of a state: see
    hybrid_model/scales.py, from which the exporter takes them. */
 typedef struct {
-    double roundings, instant, instant_in_gap, border, absolute, rounding_level, probe, overshoot;
-    double accumulation, crowd, resolved;
+    double roundings, instant, instant_in_gap, border, absolute, rounding_level, unknown, probe, overshoot;
+    double accumulation, crowd, resolved, chatter, pause;
 } ModelScales;
 
 typedef struct {

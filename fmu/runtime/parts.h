@@ -75,6 +75,7 @@ typedef struct {
 /* The scalars that evolve. */
 typedef struct {
     double relative_tolerance;
+    double floor;                 /* size that all states have at least, where they have shown none by themselves */
     double start_time, stop_time;
     double jumps_time;            /* of the last visible jump, at which time_jumps_there counts */
     uint64_t time_jumps_there;
@@ -182,6 +183,9 @@ bool first_enabled(Engine *engine, const Point *point, size_t *jump);
 bool step_begin(Engine *engine, const Point *point);
 /* The length of a first step from the point towards `limit`; step_begin comes before. */
 bool first_step(Engine *engine, const Point *point, double limit, double *h);
+/* Gives states that are far below where a flow to `limit` may lead a size of that; whether they got one.
+   step_begin comes before. */
+bool raise_floor(Engine *engine, const Point *point, double limit);
 /* One accepted step from the point towards `limit`, which it never passes; the result is in engine->step. */
 bool step_accept(Engine *engine, const Point *point, double limit);
 /* The point takes the end of the step. */

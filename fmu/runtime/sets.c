@@ -65,9 +65,10 @@ static double change_by_size(Engine *engine, const Point *point, double t, const
     for (size_t i = 0; i < engine->model->n_states; i++) {
         double weight = 1.0 - 0.5 * fmod((double)i * 0.6180339887498949, 1.0);
         double sign = to_and_fro && i % 2 ? -1.0 : 1.0;
-        double size = state_size(engine, point, i, x[i]);
-        /* What may be all rounding counts as large. */
-        bool rounding = engine->model->nominals[i] <= 0.0 && size < engine->model->scales.rounding_level * largest;
+        /* As large as the states are here: what they once were counts only where they may be rounding errors of it. */
+        double nominal = engine->model->nominals[i], present = fmax(fabs(point->x[i]), fabs(x[i]));
+        double size = nominal > 0.0 ? nominal : present;
+        bool rounding = nominal <= 0.0 && size < engine->model->scales.rounding_level * largest;
         moved[i] = x[i] + border * sign * weight * (rounding ? largest : size);
     }
     return fabs(trial_margin(engine, t, moved, point->z) - here);

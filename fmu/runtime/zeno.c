@@ -13,17 +13,23 @@
 #define BURST_JUMPS 100
 #define BURST_SHRINKS 0.999       /* gaps shrink within a burst if the last is less than this part of the first */
 
+static double last_gap(const JumpHistory *history)
+{
+    return history->times[N_ZENO_TIMES - 1] - history->times[N_ZENO_TIMES - 2];
+}
+
 /* Keeps the longest gap, and the first one of those that shrink. */
-static void measure(JumpHistory *history, double t)
+static void measure(const ModelScales *scales, JumpHistory *history, double t)
 {
     double gap = t - history->times[N_ZENO_TIMES - 1];
-    bool shrinks = history->stored > 1 && gap < history->times[N_ZENO_TIMES - 1] - history->times[N_ZENO_TIMES - 2];
-    history->longest = fmax(history->longest, gap);
-    if (!shrinks)
+    double before = history->stored > 1 ? last_gap(history) : 0.0;
+    bool after_pause = gap < scales->pause * before;
+    history->longest = after_pause ? gap : fmax(history->longest, gap);
+    if (after_pause || !(gap < before))
         history->shrinking_from = gap;
 }
 
-static void remember(JumpHistory *history, double t)
+static void remember(const ModelScales *scales, JumpHistory *history, double t)
 {
     history->total++;
     history->at_once++;
@@ -31,7 +37,7 @@ static void remember(JumpHistory *history, double t)
         return;
     history->at_once = 1;
     if (history->stored > 0)
-        measure(history, t);
+        measure(scales, history, t);
     for (size_t i = 0; i + 1 < N_ZENO_TIMES; i++)
         history->times[i] = history->times[i + 1];
     history->times[N_ZENO_TIMES - 1] = t;
@@ -46,11 +52,6 @@ static void remember(JumpHistory *history, double t)
         history->burst_gap = t - history->burst_start;
 }
 
-static double last_gap(const JumpHistory *history)
-{
-    return history->times[N_ZENO_TIMES - 1] - history->times[N_ZENO_TIMES - 2];
-}
-
 /* Whether a burst is full, and an accumulation. */
 static bool crowded(const Engine *engine, const JumpHistory *history, double t)
 {
@@ -58,7 +59,7 @@ static bool crowded(const Engine *engine, const JumpHistory *history, double t)
     double span = t - history->burst_start;
     bool shrinks = last_gap(history) < BURST_SHRINKS * history->burst_gap;
     return history->burst >= BURST_JUMPS && ((shrinks && span <= scales->crowd * history->longest) ||
-                                             span <= BURST_JUMPS * scales->resolved * time_ulp(t));
+                                             span <= BURST_JUMPS * scales->chatter * time_ulp(t));
 }
 
 /* Whether the newest gaps shrink geometrically: the last gap, and the last ratio. */
@@ -82,7 +83,7 @@ bool zeno_record(Engine *engine, size_t jump)
     JumpHistory *history = &engine->history[jump];
     const char *name = NAME_AT(engine->model, engine->model->jumps[jump].name);
     double t = *engine->live.time, gap = 0.0, ratio = 0.0;
-    remember(history, t);
+    remember(&engine->model->scales, history, t);
     unsigned long long total = history->total, at_once = history->at_once, burst = history->burst;
     if (at_once > JUMPS_AT_ONE_TIME)
         return problem(engine, ENDED_ZENO,

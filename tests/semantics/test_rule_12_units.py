@@ -214,3 +214,128 @@ def test_a_run_of_any_size_is_verified_and_what_is_wrong_is_seen(size):
     samples = arc.samples()
     samples.values["x"][5] += 1e-5 * size
     assert not hm.verify(Ring(size=size), samples).ok
+
+
+class Waking(hm.HybridAutomaton):
+    """At rest at zero until something comes from outside after 1 s: x' = max(t - 1, 0)^2 / unit^2 - x / unit."""
+
+    x = hm.State(0.0, output=True)
+    unit = hm.Parameter(1.0)
+
+    def flow_map(self, s):
+        t = s.t / s.unit
+        return {"x": (np.maximum(t - 1.0, 0.0) ** 2 - s.x) / s.unit}
+
+
+WOKEN = 4.0 - 2.0 * 2.0 + 2.0 - 2.0 * np.exp(-2.0)
+"""x(3 s): of x' = r^2 - x with r = t - 1 from x = 0 at r = 0, r^2 - 2 r + 2 - 2 exp(-r) at r = 2."""
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("x", [0.0, 1e-300, 1e-20])
+@pytest.mark.parametrize("method", ["DOP853", "RK45"])
+def test_a_system_at_rest_at_zero_wakes(unit, x, method):
+    arc = hm.simulate(Waking(x=x, unit=unit), 3.0 * unit, solver=hm.Solver(method=method))
+    assert arc.end.x == pytest.approx(WOKEN, abs=1e-11)
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_an_fmu_at_rest_at_zero_wakes(fmi, exported):
+    path = str(exported(Waking(), "waking", fmi=fmi))
+    for step in (3.0, 0.1):
+        found = fmpy.simulate_fmu(path, stop_time=3.0, step_size=step, output_interval=step)
+        assert found["x"][-1] == pytest.approx(WOKEN, abs=1e-11)
+
+
+class Powers(hm.HybridAutomaton):
+    """x' = t^k from zero: nothing to measure it by at first."""
+
+    x = hm.State(0.0)
+    k = hm.Parameter(7.0)
+
+    def flow_map(self, s):
+        return {"x": s.t**s.k}
+
+
+@pytest.mark.parametrize("k", [1.0, 5.0, 7.0])
+def test_a_state_that_grows_out_of_zero_is_followed(k):
+    assert hm.simulate(Powers(k=k), 2.0).end.x == pytest.approx(2.0 ** (k + 1.0) / (k + 1.0), rel=1e-12)
+
+
+class Beside(hm.HybridAutomaton):
+    """A ring of small size beside a large state that has nothing to do with it; it counts half turns."""
+
+    large = hm.State(1e5)
+    x = hm.State(1e-9, output=True)
+    v = hm.State(0.0)
+    n = hm.DiscreteState(0, integer=True, output=True)
+    side = hm.DiscreteState(1.0)
+
+    def flow_map(self, s):
+        return {"large": 0.0 * s.large, "x": 10.0 * s.v, "v": -10.0 * s.x}
+
+    def jump_set(self, s):
+        return hm.least(-s.x * s.side, -s.v * s.side)
+
+    def jump_map(self, s):
+        return {"n": s.n + 1, "side": -s.side}
+
+
+@RUNS
+@pytest.mark.parametrize(("size", "accuracy"), [(1e-6, 1e-8), (1e-9, 1e-4)])
+def test_a_large_state_does_not_cost_a_small_one_its_digits(kind, size, accuracy, exported):
+    if kind == "python":
+        arc = hm.simulate(Beside(x=size), 10.0)
+        n, x = arc.end.n, arc.end.x
+    else:
+        slave = AutomatonSlave("b", Beside(x=size)) if kind == "slave" else FmuSlave("b", exported(Beside(), "beside"))
+        slave.set("x", size)
+        final = run_event_exact(System([slave], {}), 10.0).final
+        n, x = final["b.n"], final["b.x"]
+    assert n == 32
+    assert x / size == pytest.approx(np.cos(100.0), abs=accuracy)
+
+
+class Bent(hm.HybridAutomaton):
+    """Its guard is the smaller of one that is crossed at the end of the run, and of one that never is."""
+
+    fast = hm.State(0.0)
+    slow = hm.State(5e-11)
+    n = hm.DiscreteState(0, integer=True, output=True)
+    rate = hm.Parameter(1e5)
+
+    def flow_map(self, s):
+        return {"fast": s.rate, "slow": 0.0 * s.slow}
+
+    def jump_set(self, s):
+        return hm.least(s.fast - s.rate, s.slow - 1e-10)
+
+    def jump_map(self, s):
+        return {"n": s.n + 1, "fast": 0.0}
+
+
+@pytest.mark.parametrize("rate", [1e5, 123.456, 7.0])
+def test_a_guard_that_bends_at_the_end_of_a_run_is_not_taken_for_one_that_rises(rate, exported):
+    for t_end in (0.5, 1.0, 1.5):
+        assert hm.simulate(Bent(rate=rate), t_end).end.n == 0
+    path = str(exported(Bent(), "bent"))
+    found = fmpy.simulate_fmu(path, stop_time=2.0, step_size=1.0, output_interval=1.0, start_values={"rate": rate})
+    assert found["n"].tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("start", [1e3, 1e5])
+def test_where_a_flow_set_ends_does_not_depend_on_how_large_a_state_once_was(start):
+    class Pump(hm.HybridAutomaton):
+        """Empties down to 1e-4, where nothing lets it go on."""
+
+        p = hm.State(start)
+
+        def flow_map(self, s):
+            return {"p": -s.p}
+
+        def flow_set(self, s):
+            return s.p - 1e-4
+
+    arc = hm.simulate(Pump(), 40.0)
+    assert arc.stop is hm.Stop.BLOCKED
+    assert arc.t[-1] == pytest.approx(np.log(start / 1e-4), abs=1e-6)
