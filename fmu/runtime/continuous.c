@@ -97,6 +97,7 @@ Answer instance_completed_step(void *handle, const char *function, bool *event, 
     if (!event || !terminate)
         return null_argument(instance, function);
     /* An importer that does not watch the indicators still does not pass an event unseen, nor leave the flow set. */
+    engine_note_rates(instance->engine);
     *event = engine_pending(instance->engine) < model.n_jumps;
     *terminate = !*event && !engine_may_flow(instance->engine);
     if (*terminate)

@@ -88,8 +88,10 @@ void engine_set_states(Engine *engine, const double *x);
 /* The values of a bank (states, inputs, parameters, outputs, derivatives, indicators) in a view; NULL if
    they cannot be computed, then engine_problem says why.  Indicators are the margins of the jumps, then
    that of the flow set if there is one. */
-/* Rates where the flow map gives none: outside the flow set, where an integrator may try a point, those of the last
-   point at which there were any stand for it.  NULL where the run itself would be there, or none are known. */
+/* Notes the rates at a point that an integrator has come to. */
+void engine_note_rates(Engine *engine);
+/* Rates where the flow map gives none: outside the flow set, where an integrator may try a point, those noted last
+   stand for it.  NULL where the point is not outside, or none are noted. */
 const double *engine_outer_rates(Engine *engine, View view);
 const double *engine_values(Engine *engine, View view, Bank bank);
 size_t engine_indicators(const Engine *engine);

@@ -27,6 +27,8 @@ Answer instance_leave_event_mode(void *handle, const char *function, int mode)
         return refuse(instance, "%s: %s: an instance of this kind has no '%s'.", instance->name, function,
                       mode_name(mode));
     engine_clear_ticks(instance->engine);
+    if (mode == MODE_CONTINUOUS)
+        engine_note_rates(instance->engine);
     instance->run->mode = mode;
     return ANSWER_OK;
 }

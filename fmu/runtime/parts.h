@@ -103,7 +103,7 @@ struct Engine {
     JumpHistory *history;
     unsigned char *ticked;
     double *segment[N_SEGMENT];
-    double *inner_rates;          /* the last ones shown that were numbers */
+    double *inner_rates;          /* noted for points outside the flow set */
     /* Scratch: nothing here outlives a call, except the cache of a view. */
     unsigned char *scratch;
     const double **arg;

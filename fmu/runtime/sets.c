@@ -63,7 +63,7 @@ static double change_by_size(Engine *engine, const Point *point, double t, const
 {
     double *moved = engine->probe_x, border = engine->model->scales.border, largest = largest_state(engine, point, x);
     for (size_t i = 0; i < engine->model->n_states; i++) {
-        double weight = 1.0 - 0.5 * fmod((double)i * 0.6180339887498949, 1.0);
+        double turns = (double)i * 0.6180339887498949, weight = 1.0 - 0.5 * (turns - (double)(size_t)turns);
         double sign = to_and_fro && i % 2 ? -1.0 : 1.0;
         /* As large as the states are here: what they once were counts only where they may be rounding errors of it. */
         double nominal = engine->model->nominals[i], present = fmax(fabs(point->x[i]), fabs(x[i]));

@@ -145,16 +145,15 @@ static bool indicators(Engine *engine)
            evaluate_view(engine, m->margins, "jump sets", engine->indicators, &engine->has_indicators);
 }
 
-/* Keeps rates that are numbers. */
-static const double *keep_rates(Engine *engine)
+void engine_note_rates(Engine *engine)
 {
-    size_t n = engine->model->n_states;
-    for (size_t i = 0; i < n; i++)
-        if (!isfinite(engine->rates[i]))
-            return engine->rates;
-    copy_values(engine->inner_rates, engine->rates, n);
+    const Model *m = engine->model;
+    const double *rates = m->has_flow_set ? engine_values(engine, VIEW_LIVE, BANK_DERIVATIVE) : NULL;
+    for (size_t i = 0; i < m->n_states; i++)
+        if (!rates || !isfinite(rates[i]))
+            return;
+    copy_values(engine->inner_rates, rates, m->n_states);
     engine->status->has_inner_rates = true;
-    return engine->rates;
 }
 
 const double *engine_outer_rates(Engine *engine, View view)
@@ -189,7 +188,7 @@ const double *engine_values(Engine *engine, View view, Bank bank)
     case BANK_STATE: return engine->shown.x;
     case BANK_DISCRETE: return engine->shown.z;
     case BANK_DERIVATIVE:
-        return evaluate_view(engine, m->flow, "flow map", engine->rates, &engine->has_rates) ? keep_rates(engine) : NULL;
+        return evaluate_view(engine, m->flow, "flow map", engine->rates, &engine->has_rates) ? engine->rates : NULL;
     case BANK_INDICATOR: return indicators(engine) ? engine->indicators : NULL;
     default:
         return evaluate_view(engine, m->outputs, "outputs", engine->outputs, &engine->has_outputs) ? engine->outputs
