@@ -35,10 +35,10 @@ OVERSHOOT = 1000.0
 ACCUMULATION = 1e-6
 """Jumps accumulate if what is left of the geometric series of their gaps is below this part of its longest gap."""
 CROWD = 1e-6
-"""Jumps crowd if many of them, at shrinking gaps, come within this part of the longest gap."""
+"""Jumps crowd if many of them come within this part of the longest gap since the last pause."""
 RESOLVED = 1e4
 """In ulp: gaps below have ratios that rounding blurs, so a geometric series is judged before."""
-CHATTER = 32.0
+CHATTER = 1000.0
 """In ulp: jumps at gaps below are no events in time any more."""
 PAUSE = 1e-4
 """A gap that is below this part of the one before does not continue it: what was before is a pause."""

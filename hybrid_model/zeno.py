@@ -13,8 +13,6 @@ from hybrid_model.errors import SimulationError
 from hybrid_model.scales import ACCUMULATION, CHATTER, CROWD, PAUSE, RESOLVED, ulp
 
 HISTORY = 12
-SHRINKS = 0.999
-"""Gaps shrink within a crowd if the last is less than this part of the first."""
 GAPS = 8
 """Ratios of successive gaps are compared over this many gaps: enough to tell geometric shrinking from chance."""
 
@@ -31,8 +29,8 @@ class ZenoGuard:
     jumps_at_once : int
         More jumps of one name than this at one instant end the run.
     window : float, optional
-        In s; `jumps_in_window` jumps of one name within it end the run. Default: a millionth of the longest gap so far
-        if gaps still shrink, or gaps that floats at that time do not resolve.
+        In s; `jumps_in_window` jumps of one name within it end the run. Default: a millionth of the longest gap since
+        the last pause, or gaps that floats at that time do not resolve.
     jumps_in_window : int
         See `window`.
     remainder : float, optional
@@ -155,8 +153,7 @@ class ZenoMonitor:
         if self.guard.window is not None:
             crowded = span <= self.guard.window
         else:
-            shrink = recent[-1] - recent[-2] < SHRINKS * (recent[-n + 1] - recent[-n])
-            crowded = (shrink and span <= CROWD * self._longest[jump]) or span <= n * CHATTER * ulp(recent[-1])
+            crowded = span <= max(CROWD * self._longest[jump], n * CHATTER * ulp(recent[-1]))
         if not crowded:
             return None
         return (

@@ -63,8 +63,7 @@ typedef enum { PREDICTION_NONE, PREDICTION_EVENT, PREDICTION_RENEWAL, PREDICTION
 typedef struct {
     double times[N_ZENO_TIMES];   /* distinct ones, the newest last */
     double burst_start;
-    double burst_gap;             /* the first one of the burst */
-    double longest;               /* gap so far */
+    double longest;               /* gap since the last pause */
     double shrinking_from;        /* the first of the gaps that shrink */
     uint64_t total;
     uint64_t stored;

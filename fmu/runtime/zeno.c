@@ -2,8 +2,8 @@
    counted by itself: many parts of a model that jump together are not yet an accumulation.
 
    (a) more jumps at one instant than any cascade needs; (b) gaps that shrink like a geometric
-   sequence whose rest is small beside them: the jumps accumulate; (c) a burst of jumps at gaps that still
-   shrink and are small beside the longest one, or that floating point does not resolve. */
+   sequence whose rest is small beside them: the jumps accumulate; (c) a burst of jumps that is
+   small beside the longest gap since the last pause, or that floating point does not resolve. */
 #include <math.h>
 
 #include "parts.h"
@@ -11,7 +11,6 @@
 #define N_GAPS 8                  /* gaps that must look geometric */
 #define RATIO_SPREAD 0.05
 #define BURST_JUMPS 100
-#define BURST_SHRINKS 0.999       /* gaps shrink within a burst if the last is less than this part of the first */
 
 static double last_gap(const JumpHistory *history)
 {
@@ -48,8 +47,6 @@ static void remember(const ModelScales *scales, JumpHistory *history, double t)
         history->burst = 0;
     }
     history->burst++;
-    if (history->burst == 2)
-        history->burst_gap = t - history->burst_start;
 }
 
 /* Whether a burst is full, and an accumulation. */
@@ -57,9 +54,8 @@ static bool crowded(const Engine *engine, const JumpHistory *history, double t)
 {
     const ModelScales *scales = &engine->model->scales;
     double span = t - history->burst_start;
-    bool shrinks = last_gap(history) < BURST_SHRINKS * history->burst_gap;
-    return history->burst >= BURST_JUMPS && ((shrinks && span <= scales->crowd * history->longest) ||
-                                             span <= BURST_JUMPS * scales->chatter * time_ulp(t));
+    double least = BURST_JUMPS * scales->chatter * time_ulp(t);
+    return history->burst >= BURST_JUMPS && span <= fmax(scales->crowd * history->longest, least);
 }
 
 /* Whether the newest gaps shrink geometrically: the last gap, and the last ratio. */
