@@ -7,6 +7,9 @@
 
 #include "search.h"
 
+/* So many instants before an event an importer may stop. */
+#define IMPORTER_INSTANTS 50.0
+
 /* The time within one instant after `from` at which guards that are negative there cross, the
    first or the last of them.  `from` itself if there is none. */
 static double crossing_soon_after(Search *search, double from, bool want_first)
@@ -85,10 +88,11 @@ static FlowEnd leave_flow_set(Search *search, double t)
 
 /* The margins of the jumps one instant after x at t, in `then`; past the end of the run time itself stands still, and
    what time alone changes goes on as it did.  False if they cannot be told. */
-static bool look_one_instant_on(Engine *engine, const Point *point, double t, const double *x, double *then)
+static bool look_one_instant_on(Engine *engine, const Point *point, double t, const double *x, double ahead,
+                                double *then)
 {
     const Model *m = engine->model;
-    double ahead = one_instant(engine, t), soon = fmin(t + ahead, engine->status->stop_time);
+    double soon = fmin(t + ahead, engine->status->stop_time);
     double before = fmax(t - (t + ahead - soon), engine->status->start_time);
     double *rates = engine->probe_k[1], *moved = engine->dense_x;
     if (m->n_states > 0 && !evaluate(engine, m->flow, t, x, point->z, rates, NULL))
@@ -115,7 +119,7 @@ static bool look_one_instant_on(Engine *engine, const Point *point, double t, co
 }
 
 /* Guards that are crossed within one instant after t count as crossed. */
-static bool raise_guards(Engine *engine, const Point *point, double t)
+static bool raise_guards(Engine *engine, const Point *point, double t, double ahead)
 {
     const Model *m = engine->model;
     Search search = {.engine = engine, .point = point, .level = 0.0, .piece_end = t,
@@ -127,7 +131,7 @@ static bool raise_guards(Engine *engine, const Point *point, double t)
     if (!look(&search, ON_STEP, t, now))
         return false;
     const double *x = t == step->t0 ? step->x0 : t == step->t1 ? step->x1 : engine->probe_x;
-    if (!look_one_instant_on(engine, point, t, x, then))
+    if (!look_one_instant_on(engine, point, t, x, ahead, then))
         return true;
     for (size_t row = 0; row < m->n_margins; row++)
         if (engine->is_guard[row] && now[row] < 0.0 && then[row] >= 0.0)
@@ -137,18 +141,19 @@ static bool raise_guards(Engine *engine, const Point *point, double t)
 
 bool raise_levels(Engine *engine, const Point *point, double t)
 {
-    return engine->model->flow_priority || raise_guards(engine, point, t);
+    return engine->model->flow_priority || raise_guards(engine, point, t, one_instant(engine, t));
 }
 
 bool raise_levels_here(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
-    double now, t = *point->time, ahead = one_instant(engine, t), earlier = fmax(t - ahead, engine->status->start_time);
+    /* An importer that integrates by itself locates less finely. */
+    double now, t = *point->time, ahead = IMPORTER_INSTANTS * one_instant(engine, t), earlier = fmax(t - ahead, engine->status->start_time);
     note_sizes(engine, point);
     /* An importer may locate an event a little behind its guard, where the flow map need not be defined. */
     if (!step_begin(engine, point))
         return true;
-    if (!raise_guards(engine, point, *point->time))
+    if (!raise_guards(engine, point, t, ahead))
         return false;
     if (!m->flow_priority || !m->has_flow_set)
         return true;
