@@ -101,8 +101,8 @@ MUTANTS = [
     Mutant(
         "levels are not raised",
         "locate.c",
-        "if (engine->is_guard[row] && now[row] < 0.0 && now[row] + part",
-        "if (false && now[row] < 0.0 && now[row] + part",
+        "if (engine->is_guard[row] && now[row] < 0.0 && then[row] >= 0.0)\n            point->level",
+        "if (false && now[row] < 0.0 && then[row] >= 0.0)\n            point->level",
         "a crossing that rounding puts behind the stop time",
         "check_crossings_at_the_ends",
     ),
