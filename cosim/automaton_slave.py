@@ -9,11 +9,11 @@ import numpy as np
 from cosim.errors import CosimError, MisfitError
 from cosim.slave import Port, Slave, Step, Update, Value
 from hybrid_model import Automaton, Execution, Solver
-from hybrid_model.automaton_block import AutomatonBlock
+from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.signals import Inputs
+from hybrid_model.declare.variables import Kind, element_names
 from hybrid_model.errors import SchedulingError
-from hybrid_model.layout import Layout
-from hybrid_model.signals import Inputs
-from hybrid_model.variables import Kind, element_names
+from hybrid_model.schedule.automaton_block import AutomatonBlock
 
 
 class AutomatonSlave(Slave):

@@ -11,9 +11,9 @@ from cosim.automaton_slave import AutomatonSlave
 from cosim.fmu_slave import FmuSlave
 from cosim.result import CosimResult
 from cosim.system import System
-from hybrid_model.consensus.network import agent_name, broadcast_wires, scenario_agents
-from hybrid_model.consensus.report import RunReport, edge_norm
-from hybrid_model.consensus.scenario_data import Scenario
+from hybrid_model.consensus.laws.closed_loop import agent_name, broadcast_wires, scenario_agents
+from hybrid_model.consensus.runs.report import RunReport, edge_norm
+from hybrid_model.consensus.scenario.scenario_data import Scenario
 
 CLOCK = "broadcast_clock"
 

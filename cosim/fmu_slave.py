@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import CosimError, MisfitError
-from cosim.fmu_access import FmuAccess
-from cosim.fmu_calls import FmuCalls
-from cosim.fmu_file import FmuFile
-from cosim.fmu_instance import FmuInstance
-from cosim.fmu_variables import STRUCTURAL, FmuVariables
+from cosim.instances.access import FmuAccess
+from cosim.instances.calls import FmuCalls
+from cosim.instances.fmu_file import FmuFile
+from cosim.instances.instance import FmuInstance
+from cosim.instances.variables import STRUCTURAL, FmuVariables
 from cosim.slave import Slave, Step, Update, Value
 from fmu.importer.values import UnfitError, exact, parsed, require_within
 from hybrid_model.scales import ROUNDINGS

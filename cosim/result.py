@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from hybrid_model.blocks import Termination
-from hybrid_model.scheduler import Event, Tick
+from hybrid_model.schedule.blocks import Termination
+from hybrid_model.schedule.scheduler import Event, Tick
 
 __all__ = ["CosimResult", "Ended", "Event", "Tick"]
 

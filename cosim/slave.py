@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import MisfitError
-from hybrid_model.blocks import Block, Step, Termination, Update
+from hybrid_model.schedule.blocks import Block, Step, Termination, Update
 
 __all__ = ["Port", "Slave", "Step", "Termination", "Update", "Value"]
 

@@ -5,9 +5,5 @@ class ExportError(RuntimeError):
     """An automaton cannot become an FMU as it is."""
 
 
-class TraceError(ExportError, TypeError):
-    """A map cannot be traced: it does with a value what only a number allows."""
-
-
 class BuildError(RuntimeError):
     """An FMU could not be compiled or packaged; the message says why and what to do."""

@@ -8,18 +8,18 @@ import tempfile
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
-from fmu.archive import archive_content
-from fmu.build import RUNTIME, binaries, fmi_headers, package, runtime_sources
-from fmu.code import model_code
-from fmu.description import model_identifier
+from fmu.build.binaries import binaries, fmi_headers, own_files, package, runtime_sources
+from fmu.build.content import archive_content
+from fmu.build.model_code import model_code
+from fmu.build.package import check_target
+from fmu.describe.description import model_identifier
+from fmu.describe.variables import Fmi, fmu_variables
 from fmu.errors import ExportError
-from fmu.network import NetworkTrace, trace_any
-from fmu.package import check_target
-from fmu.variables import Fmi, fmu_variables
 from hybrid_model import Automaton
-from hybrid_model.arguments import require_automaton
-from hybrid_model.calls import explained
-from hybrid_model.real_numbers import is_real
+from hybrid_model.declare.arguments import require_automaton
+from hybrid_model.declare.calls import explained
+from hybrid_model.declare.real_numbers import is_real
+from hybrid_model.native.networks.network import NetworkTrace, trace_any
 
 KINDS = ("cs", "me")
 """Co-Simulation and Model Exchange."""
@@ -58,7 +58,7 @@ def export_fmu(
         Platforms that it is to run on, named as in FMI 3.0, such as ``x86_64-linux``; this machine's if not given.
     stop_time, step_size : float, optional
         Default stop time and communication step in s that the description proposes. With a stop time the archive holds
-        the results of a run in Python up to it, except for large networks (`fmu.network.worth_looping`). Without a step
+        the results of a run in Python up to it, except for large networks (`hybrid_model.native.networks.network.worth_looping`). Without a step
         it proposes a round share of the stop time, else of the fastest time or rate among the parameters.
     sources : bool
         Whether the archive holds the C sources as well.
@@ -77,7 +77,7 @@ def export_fmu(
     ------
     ExportError
         If a map cannot be traced, a name is taken twice, an option is unknown, or a time is not finite and positive.
-    fmu.build.BuildError
+    fmu.build.binaries.BuildError
         If there is no C compiler, the code does not compile, or the file cannot be written.
     """
     require_automaton("export_fmu", automaton)
@@ -132,7 +132,7 @@ def _check_experiment(stop_time: float | None, step_size: float | None) -> None:
 
 
 def _headers() -> list[Path]:
-    return sorted(RUNTIME.glob("*.h"))
+    return own_files("*.h")
 
 
 def _version(fmi: Fmi | str) -> Fmi:

@@ -1,10 +1,14 @@
 """Hybrid automata: declare them once, run them event-exactly, export and co-simulate them."""
 
-from hybrid_model.arc import HybridArc
-from hybrid_model.arc_file import load_arc
-from hybrid_model.automaton import Automaton, HybridAutomaton
-from hybrid_model.compose import Composition
-from hybrid_model.dwell import MinimumDwell
+from hybrid_model.declare.automaton import Automaton, HybridAutomaton
+from hybrid_model.declare.composition import Composition
+from hybrid_model.declare.dwell import MinimumDwell
+from hybrid_model.declare.margins import greatest, least
+from hybrid_model.declare.modes import ModalAutomaton, Mode, Switch, TimedSwitch
+from hybrid_model.declare.signals import Signal
+from hybrid_model.declare.transitions import Clock, Jump, Priority, TimeEvent
+from hybrid_model.declare.variables import Dimension, DiscreteState, Input, Output, Parameter, State, Values
+from hybrid_model.declare.wiring import feedback, product, series
 from hybrid_model.errors import (
     AlgebraicLoopError,
     DataError,
@@ -13,22 +17,18 @@ from hybrid_model.errors import (
     SimulationError,
     WiringError,
 )
-from hybrid_model.event_network import NetworkRun, simulate_network
-from hybrid_model.execution import Execution, JumpRecord
-from hybrid_model.margins import greatest, least
-from hybrid_model.modes import ModalAutomaton, Mode, Switch, TimedSwitch
-from hybrid_model.samples import Samples
-from hybrid_model.signals import Signal
+from hybrid_model.record.arc import HybridArc
+from hybrid_model.record.arc_file import load_arc
+from hybrid_model.record.samples import Samples
+from hybrid_model.reference.execution import Execution, JumpRecord
+from hybrid_model.reference.zeno import ZenoGuard
+from hybrid_model.schedule.event_network import NetworkRun, simulate_network
 from hybrid_model.simulate import simulate
 from hybrid_model.solver import Method, Solver
 from hybrid_model.stop import Stop
-from hybrid_model.transitions import Clock, Jump, Priority, TimeEvent
-from hybrid_model.variables import Dimension, DiscreteState, Input, Output, Parameter, State, Values
-from hybrid_model.verify import verify
-from hybrid_model.verify_report import Verification, Violation
-from hybrid_model.verify_subject import Tolerances
-from hybrid_model.wiring import feedback, product, series
-from hybrid_model.zeno import ZenoGuard
+from hybrid_model.verification.report import Verification, Violation
+from hybrid_model.verification.subject import Tolerances
+from hybrid_model.verification.verify import verify
 
 __all__ = [
     "AlgebraicLoopError",

@@ -21,6 +21,10 @@ class SimulationError(HybridModelError, RuntimeError):
     """A run cannot start or go on: bad arguments, or a value that is not finite."""
 
 
+class TraceError(HybridModelError, TypeError):
+    """A map cannot be traced with symbols: it does with a value what only a number allows."""
+
+
 class DataError(HybridModelError, ValueError):
     """Data from outside, in a table or a file, are not what they must be."""
 

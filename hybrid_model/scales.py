@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from hybrid_model.variables import FloatArray
+from hybrid_model.declare.variables import FloatArray
 
 ROUNDINGS = 8.0
 """Times that differ by fewer ulp are one: 3 * 0.1 and 0.3."""

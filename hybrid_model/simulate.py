@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from hybrid_model.arc import HybridArc
-from hybrid_model.arguments import real_number, require_automaton, require_inputs, require_options
-from hybrid_model.automaton import Automaton
-from hybrid_model.calls import explained
+from hybrid_model.declare.arguments import real_number, require_automaton, require_inputs, require_options
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.calls import explained
+from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.signals import Inputs, InputValue
 from hybrid_model.errors import SimulationError
-from hybrid_model.execution import Execution
-from hybrid_model.layout import Layout
-from hybrid_model.recording import Recording
-from hybrid_model.signals import Inputs, InputValue
+from hybrid_model.record.arc import HybridArc
+from hybrid_model.record.recording import Recording
+from hybrid_model.reference.execution import Execution
+from hybrid_model.reference.zeno import ZenoGuard
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
-from hybrid_model.zeno import ZenoGuard
 
 
 @explained(solver=Solver, zeno=ZenoGuard)

@@ -9,9 +9,9 @@ from typing import Any
 
 from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
 
+from hybrid_model.declare.real_numbers import is_real, told
+from hybrid_model.declare.signatures import ExplainedCall
 from hybrid_model.errors import SimulationError
-from hybrid_model.real_numbers import is_real, told
-from hybrid_model.signatures import ExplainedCall
 
 
 class Method(enum.Enum):
@@ -40,7 +40,7 @@ class Solver(ExplainedCall):
     max_step : float
         Longest step in s.
     scan_points : int
-        Samples of every margin in a step, in whole eights; see `hybrid_model.locate` for what that bounds.
+        Samples of every margin in a step, in whole eights; see `hybrid_model.reference.locate` for what that bounds.
     event_tolerance : float, optional
         In s: crossings closer than this are taken at one instant, in the fixed order of the jumps. The same number, in
         the margin's unit, is how far outside the flow set rounding may leave a state. Default: both follow from the

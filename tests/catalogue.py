@@ -9,9 +9,10 @@ from catalogue_weights import weights_cases
 
 import hybrid_model as hm
 import hybrid_model.models
-from hybrid_model.consensus import agents, edges
-from hybrid_model.consensus.network import closed_loop, scenario_agents
-from hybrid_model.consensus.scenario import load_scenario, replace_trigger
+from hybrid_model.consensus.laws import agents
+from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, replace_trigger
+from hybrid_model.consensus.weights import automata as edges
 from hybrid_model.linear import lti
 
 

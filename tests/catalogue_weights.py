@@ -2,16 +2,16 @@
 
 import numpy as np
 
-from hybrid_model.consensus import edges
-from hybrid_model.consensus.edge_blocks import switching_block, weights_block
-from hybrid_model.consensus.edge_tables import FunctionWeights, SequenceSwitching, TabulatedWeights
-from hybrid_model.consensus.function_weights import distance_weights
-from hybrid_model.consensus.network import closed_loop, scenario_agents
-from hybrid_model.consensus.random_switching import markov_sequence
-from hybrid_model.consensus.scenario import read_scenario
-from hybrid_model.consensus.scenario_data import Scenario, Weights
-from hybrid_model.consensus.switching import NoSwitching
-from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
+from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
+from hybrid_model.consensus.scenario.scenario_data import Scenario, Weights
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.weights import automata as edges
+from hybrid_model.consensus.weights.blocks import switching_block, weights_block
+from hybrid_model.consensus.weights.functions import distance_weights
+from hybrid_model.consensus.weights.random_switching import markov_sequence
+from hybrid_model.consensus.weights.switching import NoSwitching
+from hybrid_model.consensus.weights.table_automata import FunctionWeights, SequenceSwitching, TabulatedWeights
+from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
 
 RING = {"agents": 4, "edges": [[1, 2], [2, 3], [3, 4], [4, 1]], "initial": [1.0, 2.0, 0.3, 0.4]}
 WEIGHTS = {

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from hybrid_model.consensus.analysis import connected_parts
-from hybrid_model.consensus.generators import (
+from hybrid_model.consensus.certificates.analysis import connected_parts
+from hybrid_model.consensus.graphs.generators import (
     complete_graph,
     erdos_renyi_graph,
     geometric_graph,
@@ -15,7 +15,7 @@ from hybrid_model.consensus.generators import (
     small_world_graph,
     star_graph,
 )
-from hybrid_model.consensus.scenario import read_scenario
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
 
 WEIGHTS = ("constant", "gated-sine", "sine", "square", "piecewise", "sampled")
 GRAPHS = ("path", "ring", "star", "complete", "regular", "erdos-renyi", "geometric", "small-world")

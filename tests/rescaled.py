@@ -3,8 +3,8 @@
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.automaton import Automaton
-from hybrid_model.variables import Kind, Values
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.variables import Kind, Values
 
 
 class InOtherTime(Automaton):

@@ -21,7 +21,7 @@ from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
 from hybrid_model import consensus
-from hybrid_model.variables import Kind, element_names
+from hybrid_model.declare.variables import Kind, element_names
 
 # The limits: times of events, and states.
 TIME_TOLERANCE = 1e-7

@@ -13,9 +13,9 @@ from test_agreement import python_run
 from test_arc_parts import Switched
 
 import hybrid_model as hm
-from hybrid_model.interpolants import LADDER, Polynomial, interpolate, lobatto
+from hybrid_model.declare.variables import Kind
 from hybrid_model.models import BouncingBall
-from hybrid_model.variables import Kind
+from hybrid_model.record.interpolants import LADDER, Polynomial, interpolate, lobatto
 
 # Of the largest value in the run: what the file aims at (64 ulp), and as much again for evaluating both sides.
 ROUNDING = 128 * np.finfo(np.float64).eps

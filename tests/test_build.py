@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
-import fmu.build
-import fmu.libraries
-from fmu.build import (
+import fmu.build.binaries
+import fmu.build.libraries
+from fmu.build.binaries import (
     BuildError,
     binaries,
     check_target,
@@ -78,7 +78,7 @@ def compiled(log: Path) -> list[str]:
 
 @posix
 def test_the_runtime_is_compiled_once_a_process(logged, tmp_path, monkeypatch):
-    monkeypatch.setattr(fmu.libraries, "_objects", {})
+    monkeypatch.setattr(fmu.build.libraries, "_objects", {})
     sources = runtime_sources()
     for k in range(3):
         source = tmp_path / str(k) / "model.c"
@@ -100,9 +100,9 @@ def test_kept_objects_are_those_of_the_same_build(change, logged, tmp_path, monk
     (runtime / "version.c").write_text(
         '#include "fmi3Functions.h"\n#include "value.h"\nconst char *fmi3GetVersion(void) { return "v" + VALUE; }\n'
     )
-    monkeypatch.setattr(fmu.build, "RUNTIME", runtime)
-    monkeypatch.setattr(fmu.libraries, "_objects", {})
-    monkeypatch.setattr(fmu.libraries, "STRICT_FLAGS", ())
+    monkeypatch.setattr(fmu.build.binaries, "OWN_FOLDERS", (runtime,))
+    monkeypatch.setattr(fmu.build.libraries, "_objects", {})
+    monkeypatch.setattr(fmu.build.libraries, "STRICT_FLAGS", ())
     compile_fmu([runtime / "version.c"], [fmi_headers()], tmp_path / "One.so")
     if change == "source":
         (runtime / "version.c").write_text(
@@ -111,7 +111,7 @@ def test_kept_objects_are_those_of_the_same_build(change, logged, tmp_path, monk
     elif change == "header":
         (runtime / "value.h").write_text("#define VALUE 0\n")
     elif change == "flags":
-        monkeypatch.setattr(fmu.libraries, "COMMON_FLAGS", (*fmu.libraries.COMMON_FLAGS, "-fno-builtin"))
+        monkeypatch.setattr(fmu.build.libraries, "COMMON_FLAGS", (*fmu.build.libraries.COMMON_FLAGS, "-fno-builtin"))
     elif change == "compiler":
         script = Path(os.environ["CC"])
         script.write_text(script.read_text() + "# another version\n")
@@ -184,7 +184,7 @@ def test_an_interrupt_stops_the_compilers_and_leaves_nothing(tmp_path):
     # Shells let programs in the background ignore interrupts, and their children inherit it: not so this one.
     code = (
         "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-        "from pathlib import Path; from fmu.build import compile_fmu; "
+        "from pathlib import Path; from fmu.build.binaries import compile_fmu; "
         "compile_fmu([Path('model.c'), Path('more.c')], [], Path('out/Model.so'))"
     )
     environment = {**os.environ, "CC": str(script), "TMPDIR": str(files)}
@@ -216,7 +216,7 @@ def test_the_first_error_stops_the_other_compilers(tmp_path, monkeypatch):
     )
     script.chmod(0o755)
     monkeypatch.setenv("CC", str(script))
-    monkeypatch.setattr("fmu.jobs._processors", lambda: 2)
+    monkeypatch.setattr("fmu.build.jobs._processors", lambda: 2)
     for name in ("slow.c", "bad.c"):
         (tmp_path / name).write_text("int x;\n")
     with pytest.raises(BuildError, match=r"(?s)compile 'bad.c'.*wrong"):
@@ -339,7 +339,7 @@ def test_ziglang_is_the_last_resort(monkeypatch):
 
 
 def test_other_platforms_need_ziglang(monkeypatch, tmp_path):
-    real = fmu.build.importlib.util.find_spec
+    real = fmu.build.binaries.importlib.util.find_spec
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "ziglang" else real(name))
     (tmp_path / "model.c").write_text(VERSION)
     platforms = ["x86_64-linux", "aarch64-linux"]

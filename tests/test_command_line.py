@@ -95,7 +95,7 @@ def test_unknown_keys_of_a_scenario_are_named(small, capsys):
 
 
 def test_export_of_a_class_and_run_of_its_fmu(tmp_path, capsys):
-    target = "hybrid_model.consensus.agents:Integrator"
+    target = "hybrid_model.consensus.laws.agents:Integrator"
     assert main(["export", target, "--start-value", "degree=2", "--out", str(tmp_path)]) == 0
     fmu = capsys.readouterr().out.strip()
     assert fmu == str(tmp_path / "Integrator.fmu")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
+from hybrid_model.declare.variables import Kind
 from hybrid_model.models import BouncingBall, Thermostat
-from hybrid_model.variables import Kind
 
 
 class Gain(hm.HybridAutomaton):

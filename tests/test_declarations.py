@@ -10,12 +10,11 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.errors import TraceError
 from fmu.export import export_fmu
-from fmu.trace import trace
-from hybrid_model.errors import DeclarationError
+from hybrid_model.declare.variables import Kind, element_names
+from hybrid_model.errors import DeclarationError, TraceError
 from hybrid_model.models import BouncingBall
-from hybrid_model.variables import Kind, element_names
+from hybrid_model.native.trace import trace
 
 
 class Block(hm.HybridAutomaton):

@@ -5,8 +5,8 @@ import pytest
 
 import hybrid_model as hm
 from hybrid_model import consensus
+from hybrid_model.declare.transitions import Trigger
 from hybrid_model.models import BouncingBall, FireflyNetwork
-from hybrid_model.transitions import Trigger
 
 
 def compare(network, t_end, *, atol=1e-9, **options):

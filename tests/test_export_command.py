@@ -10,9 +10,9 @@ import fmpy
 import pytest
 
 from cosim.cli.main import main
+from fmu.build.platforms import PLATFORMS, this_platform
 from fmu.errors import ExportError
 from fmu.export import export_fmu
-from fmu.platforms import PLATFORMS, this_platform
 from hybrid_model.models import BouncingBall
 
 MODEL = '''

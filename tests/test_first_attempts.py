@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.compiled import compiled
 from fmu.errors import ExportError
 from fmu.export import export_fmu
-from fmu.trace import trace
+from hybrid_model.declare.state_space import state_space
 from hybrid_model.models import BouncingBall, RestingBall
-from hybrid_model.state_space import state_space
+from hybrid_model.native.compiled import compiled
+from hybrid_model.native.trace import trace
 
 
 def ball_with(**body):

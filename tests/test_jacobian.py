@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from hybrid_model.jacobian import jacobian
+from hybrid_model.linear.jacobian import jacobian
 
 
 def derivative(function, point):

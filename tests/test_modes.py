@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.compiled import compiled
 from hybrid_model.models import Thermostat
+from hybrid_model.native.compiled import compiled
 
 
 class ModalThermostat(hm.ModalAutomaton):

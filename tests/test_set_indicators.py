@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from fmu.errors import TraceError
+from hybrid_model.errors import TraceError
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.compiled import compiled
 
 
 def ball(flow_set=None, jump_set=None):

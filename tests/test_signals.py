@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from hybrid_model.layout import Layout
+from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.signals import Inputs
 from hybrid_model.models import BouncingBall
-from hybrid_model.signals import Inputs
 
 
 class Plant(hm.HybridAutomaton):

@@ -5,9 +5,9 @@ import pytest
 from scipy.linalg import expm
 
 import hybrid_model as hm
-from fmu.trace import trace
-from fmu.variables import Fmi, fmu_variables
-from hybrid_model.state_space import state_space
+from fmu.describe.variables import Fmi, fmu_variables
+from hybrid_model.declare.state_space import state_space
+from hybrid_model.native.trace import trace
 
 A = [[0.0, 1.0], [-2.0, -0.4]]
 B = [[0.5, 0.0], [1.0, -1.0]]

@@ -5,7 +5,7 @@ import pytest
 from tuned import CHANGES, EVENTS, JUMPS, POINTS, T_END, TIMES, Tuned, TunedAndDriven, exact, held, signals
 
 import hybrid_model as hm
-from fmu.compiled import compiled
+from hybrid_model.native.compiled import compiled
 
 # Straight ramps and parabolas are exact up to the roundings of a dozen steps; times of bounces come from roots.
 TIME, STATE = 1e-11, 1e-10

@@ -17,12 +17,12 @@ from test_agreement import python_run
 
 import hybrid_model as hm
 from cosim.cli.main import main
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import load_scenario
-from hybrid_model.layout import Layout
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.transitions import Trigger
+from hybrid_model.declare.variables import Kind
 from hybrid_model.models import BouncingBall, RelayHysteresis, Thermostat, TwoTank
-from hybrid_model.transitions import Trigger
-from hybrid_model.variables import Kind
 
 G, E = 9.81, 0.7
 SLOW = ("paper", "agent", "control", "vehicle")
@@ -650,6 +650,6 @@ def test_the_verifier_uses_nothing_of_the_simulator():
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom):
                 imported.add(node.module)
-    assert "hybrid_model.automaton" in imported
+    assert "hybrid_model.declare.automaton" in imported
     forbidden = {"simulate", "execution", "flow", "locate", "zeno", "solver", "layout"}
     assert not imported & {f"hybrid_model.{name}" for name in forbidden}

@@ -10,12 +10,12 @@ from typing import Any
 
 import hybrid_model as hm
 from cosim.cli.exits import Exit, UsageError, exit_of, progress
-from fmu.compiled import compiled
-from hybrid_model.consensus.certified import Certified
-from hybrid_model.consensus.certify import Certificates, certify
-from hybrid_model.consensus.figure_certificates import save_certificate_figures
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import load_scenario
+from hybrid_model.consensus.certificates.bound_table import Certified
+from hybrid_model.consensus.certificates.certify import Certificates, certify
+from hybrid_model.consensus.figures.certificates import save_certificate_figures
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.native.compiled import compiled
 
 SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-audit.md of this project"
 """What the short names in the sources of values mean."""

@@ -18,16 +18,16 @@ from types import ModuleType
 from typing import Any
 
 from cosim.cli.exits import Exit, UsageError, progress, start_values
-from fmu.build import check_target
-from fmu.device_names import no_device
+from fmu.archives.device_names import no_device
+from fmu.build.binaries import check_target
+from fmu.build.platforms import PLATFORMS
+from fmu.describe.variables import Fmi
 from fmu.errors import ExportError
 from fmu.export import export_fmu
-from fmu.platforms import PLATFORMS
-from fmu.variables import Fmi
 from hybrid_model import Automaton
-from hybrid_model.automaton import require_made
-from hybrid_model.consensus.network import scenario_agents
-from hybrid_model.consensus.scenario import load_scenario
+from hybrid_model.consensus.laws.closed_loop import scenario_agents
+from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.declare.automaton import require_made
 
 KINDS = ("cs", "me")
 ALL = "all"

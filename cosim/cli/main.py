@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from cosim.cli import certify, cosimulate, export, paper, simulate, validate
 from cosim.cli.exits import Exit, UsageError
 from cosim.errors import CosimError
-from fmu.build import BuildError
+from fmu.build.binaries import BuildError
 from fmu.errors import ExportError
 from hybrid_model import HybridModelError
-from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.messages import ScenarioError
 
 _INTERRUPTED = 130
 """Status of a command that was interrupted from the keyboard, as shells have it."""

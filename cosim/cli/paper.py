@@ -16,16 +16,16 @@ from cosim.cli.exits import exit_of, progress
 from cosim.consensus import fmu_system, in_process_system, network_report
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult
+from fmu.describe.variables import Fmi
 from fmu.export import export_fmu
-from fmu.variables import Fmi
-from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound, convergence_bound
-from hybrid_model.consensus.certify import Certificates, certify
-from hybrid_model.consensus.figures import save_paper_figures
-from hybrid_model.consensus.network import agent_name, closed_loop, scenario_agents
-from hybrid_model.consensus.report import RunReport, edge_norm, run_report
-from hybrid_model.consensus.scenario import load_scenario
-from hybrid_model.consensus.scenario_data import Scenario, replace_trigger
-from hybrid_model.variables import FloatArray
+from hybrid_model.consensus.certificates.certify import Certificates, certify
+from hybrid_model.consensus.certificates.rates import BoundForm, ConvergenceBound, convergence_bound
+from hybrid_model.consensus.figures.run import save_paper_figures
+from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop, scenario_agents
+from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
+from hybrid_model.consensus.scenario.scenario_data import Scenario, replace_trigger
+from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.declare.variables import FloatArray
 
 PRESET = "paper-a"
 FIXED_STEPS = (0.1, 0.01, 0.001)

@@ -1,4 +1,4 @@
-"""The event-exact master: slaves that meet only at events, run by the scheduler of `hybrid_model.scheduler`."""
+"""The event-exact master: slaves that meet only at events, run by `hybrid_model.schedule.scheduler`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cosim.masters.start import outputs, require_times, sample, sample_end, star
 from cosim.result import CosimResult
 from cosim.system import System
 from hybrid_model.errors import SchedulingError
-from hybrid_model.scheduler import Scheduler
+from hybrid_model.schedule.scheduler import Scheduler
 
 ROUNDING = 1e-12
 """Relative rounding of the number of output intervals."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from fmu.check.archive import Archive
+from fmu.archives.archive import Archive
 
 _RESOURCES = "resources"
 

@@ -5,40 +5,19 @@ interactions: an event-triggered approach" ("the paper" in this package). What h
 instead, is in docs/paper-audit.md; "audit" with the number of a section means that page.
 """
 
-from hybrid_model.consensus.agents import (
-    DynamicTrigger,
-    EventGenerator,
-    Integrator,
-    MixedTrigger,
-    StaticTrigger,
-    agent,
-)
-from hybrid_model.consensus.certificates import BoundForm, ConvergenceBound, convergence_bound
-from hybrid_model.consensus.certified import Certified
-from hybrid_model.consensus.certify import Certificates, certify
-from hybrid_model.consensus.connectivity import all_spanning_trees, joint_connectivity_window, spanning_tree_count
-from hybrid_model.consensus.digraphs import BalancedSwitching
-from hybrid_model.consensus.double_integrators import (
-    double_integrator_agents,
-    double_integrator_loop,
-    double_integrator_wires,
-)
-from hybrid_model.consensus.edge_comparison import EdgeComparison, compare_edge_domain
-from hybrid_model.consensus.edge_domain import edge_domain_system
-from hybrid_model.consensus.edge_gains import EdgeGains, edge_domain_gains
-from hybrid_model.consensus.edge_tables import FunctionWeights, SequenceSwitching, TabulatedWeights
-from hybrid_model.consensus.edges import (
-    ConstantWeights,
-    GatedAbsoluteSineWeights,
-    GatedSineWeights,
-    PeriodicSwitching,
-    SineWeights,
-    SquareWeights,
-)
-from hybrid_model.consensus.excitation import ExcitationConstants, WindowExtremes, scenario_excitation
-from hybrid_model.consensus.floquet import FloquetSpectrum, floquet_spectrum
-from hybrid_model.consensus.function_weights import FunctionWeight, distance_weights, reliability_weight
-from hybrid_model.consensus.generators import (
+from hybrid_model.consensus.certificates.bound_table import Certified
+from hybrid_model.consensus.certificates.certify import Certificates, certify
+from hybrid_model.consensus.certificates.edge_comparison import EdgeComparison, compare_edge_domain
+from hybrid_model.consensus.certificates.rates import BoundForm, ConvergenceBound, convergence_bound
+from hybrid_model.consensus.certificates.windows import BestWindow, RateForm, best_window
+from hybrid_model.consensus.exact.edge_domain import edge_domain_system
+from hybrid_model.consensus.exact.edge_gains import EdgeGains, edge_domain_gains
+from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum
+from hybrid_model.consensus.exact.periodic_edge_domain import PeriodicGains, period_map, periodic_gains
+from hybrid_model.consensus.excitation.constants import ExcitationConstants, WindowExtremes, scenario_excitation
+from hybrid_model.consensus.excitation.joint import JointExcitation, joint_excitation, tree_excitations
+from hybrid_model.consensus.graphs.digraphs import BalancedSwitching
+from hybrid_model.consensus.graphs.generators import (
     AgentGraph,
     agent_graph,
     complete_graph,
@@ -50,27 +29,52 @@ from hybrid_model.consensus.generators import (
     small_world_graph,
     star_graph,
 )
-from hybrid_model.consensus.joint_excitation import JointExcitation, joint_excitation, tree_excitations
-from hybrid_model.consensus.metrics import communication, gap_statistics, performance, run_metrics
-from hybrid_model.consensus.network import broadcast_wires, closed_loop, scenario_agents
-from hybrid_model.consensus.periodic_edge_domain import PeriodicGains, period_map, periodic_gains
-from hybrid_model.consensus.random_switching import (
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition
+from hybrid_model.consensus.laws.agents import (
+    DynamicTrigger,
+    EventGenerator,
+    Integrator,
+    MixedTrigger,
+    StaticTrigger,
+    agent,
+)
+from hybrid_model.consensus.laws.closed_loop import broadcast_wires, closed_loop, scenario_agents
+from hybrid_model.consensus.laws.double_integrators import (
+    double_integrator_agents,
+    double_integrator_loop,
+    double_integrator_wires,
+)
+from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop, vector_wires
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.runs.metrics import communication, gap_statistics, performance, run_metrics
+from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
+from hybrid_model.consensus.runs.savings import Savings, run_savings
+from hybrid_model.consensus.scenario.scenario_data import Channel, Scenario, Trigger, TriggerKind, replace_trigger
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, preset_names, read_scenario
+from hybrid_model.consensus.weights.automata import (
+    ConstantWeights,
+    GatedAbsoluteSineWeights,
+    GatedSineWeights,
+    PeriodicSwitching,
+    SineWeights,
+    SquareWeights,
+)
+from hybrid_model.consensus.weights.connectivity import (
+    all_spanning_trees,
+    joint_connectivity_window,
+    spanning_tree_count,
+)
+from hybrid_model.consensus.weights.functions import FunctionWeight, distance_weights, reliability_weight
+from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine
+from hybrid_model.consensus.weights.random_switching import (
     jointly_connected_sequence,
     markov_sequence,
     random_dwell_sequence,
 )
-from hybrid_model.consensus.report import RunReport, edge_norm, run_report
-from hybrid_model.consensus.savings import Savings, run_savings
-from hybrid_model.consensus.scenario import load_scenario, preset_names, read_scenario
-from hybrid_model.consensus.scenario_data import Channel, Scenario, Trigger, TriggerKind, replace_trigger
-from hybrid_model.consensus.spanning_trees import TreePartition
-from hybrid_model.consensus.switching_sequence import SwitchingSequence
-from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
-from hybrid_model.consensus.tables import ScenarioError
-from hybrid_model.consensus.vector_agents import vector_agents, vector_loop, vector_wires
-from hybrid_model.consensus.wave_weights import SineWeight, SquareWeight
-from hybrid_model.consensus.weights import ConstantWeight, GatedSine
-from hybrid_model.consensus.windows import BestWindow, RateForm, best_window
+from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
+from hybrid_model.consensus.weights.table_automata import FunctionWeights, SequenceSwitching, TabulatedWeights
+from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
+from hybrid_model.consensus.weights.waves import SineWeight, SquareWeight
 
 __all__ = [
     "AgentGraph",

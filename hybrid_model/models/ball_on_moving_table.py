@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class BallOnMovingTable(hm.HybridAutomaton):

@@ -1,7 +1,7 @@
 """A ball on a floor."""
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class BouncingBall(hm.HybridAutomaton):

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 import hybrid_model as hm
+from hybrid_model.declare.variables import Value
 from hybrid_model.models.sampled_lti_loop import LtiPlant
-from hybrid_model.variables import Value
 
 
 class EventTriggeredFeedback(hm.HybridAutomaton):

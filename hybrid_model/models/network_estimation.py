@@ -3,7 +3,7 @@
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 DYNAMICS = ((0.0, 1.0, 0.0, 0.0), (-1.0, 0.0, 0.0, 0.0), (-2.0, 1.0, -1.0, 0.0), (2.0, -2.0, 0.0, -2.0))
 INPUT_COLUMN = (0.0, 0.0, 1.0, 0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class NewtonsCradle(hm.HybridAutomaton):

@@ -1,7 +1,7 @@
 """A point in a rectangle with elastic walls: billiards."""
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class ParticleInBox(hm.HybridAutomaton):

@@ -1,7 +1,7 @@
 """A mass pushed back and forth by a relay with hysteresis."""
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class RelayHysteresis(hm.HybridAutomaton):

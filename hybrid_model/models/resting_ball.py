@@ -1,7 +1,7 @@
 """A ball that bounces and comes to rest: a classical hybrid automaton."""
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class RestingBall(hm.ModalAutomaton):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy.typing as npt
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class LtiPlant(hm.HybridAutomaton):

@@ -1,7 +1,7 @@
 """A timer that ramps up and starts over: once by a guard on its state, once by a schedule."""
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class SawtoothTimer(hm.HybridAutomaton):

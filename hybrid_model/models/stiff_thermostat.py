@@ -1,7 +1,7 @@
 """A heated room with a fast temperature sensor: two time constants a million apart."""
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class StiffThermostat(hm.HybridAutomaton):

@@ -3,8 +3,8 @@
 import numpy as np
 
 import hybrid_model as hm
+from hybrid_model.declare.variables import Value
 from hybrid_model.models.network_estimation import LinearProcess
-from hybrid_model.variables import Value
 
 
 class StaticFeedback(hm.HybridAutomaton):

@@ -1,7 +1,7 @@
 """A heated room with a two-point controller."""
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class Thermostat(hm.HybridAutomaton):

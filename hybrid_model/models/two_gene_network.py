@@ -1,7 +1,7 @@
 """Two genes that regulate each other, with hysteresis."""
 
 import hybrid_model as hm
-from hybrid_model.variables import Value
+from hybrid_model.declare.variables import Value
 
 
 class TwoGeneNetwork(hm.HybridAutomaton):

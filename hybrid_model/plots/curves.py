@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 
-from hybrid_model.arc import HybridArc
+from hybrid_model.declare.variables import FloatArray
 from hybrid_model.plots.style import TIME, new_axes
-from hybrid_model.variables import FloatArray
+from hybrid_model.record.arc import HybridArc
 
 POINTS = 400
 """Points of a curve over a whole run, beside those at jumps and at the solver's steps."""

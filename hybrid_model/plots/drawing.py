@@ -10,8 +10,8 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from hybrid_model.declare.variables import FloatArray
 from hybrid_model.plots.trace import Scalar, Trace, jump_mask
-from hybrid_model.variables import FloatArray
 
 MARKED_JUMPS = 60
 """Jumps are marked by default up to this number; markers of more of them would hide the curve."""

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 
-from hybrid_model.arc import HybridArc
+from hybrid_model.declare.variables import FloatArray, unknown_name
 from hybrid_model.errors import DeclarationError
 from hybrid_model.plots.style import TIME, legend, new_axes, short_names
-from hybrid_model.variables import FloatArray, unknown_name
+from hybrid_model.record.arc import HybridArc
 
 Events = HybridArc | Mapping[str, npt.ArrayLike]
 """A run, or times in s by name, such as those of a co-simulation."""

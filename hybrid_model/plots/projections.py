@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
-from hybrid_model.arc import HybridArc
+from hybrid_model.declare.variables import FloatArray
 from hybrid_model.plots.drawing import draw_arc, marked_jumps
 from hybrid_model.plots.style import JUMPS, TIME, add_label, equal_scales, legend, new_axes, short_names, with_unit
 from hybrid_model.plots.trace import Scalar, Trace, find_scalar, find_scalars, jump_mask
-from hybrid_model.variables import FloatArray
+from hybrid_model.record.arc import HybridArc
 
 COMPARABLE = 10.0
 """Ranges of two numbers without unit that differ by more than this factor are given scales of their own."""

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from hybrid_model.arc import HybridArc
+from hybrid_model.declare.transitions import Trigger
+from hybrid_model.declare.variables import FloatArray, Value, Values
 from hybrid_model.plots.drawing import draw_arc, marked_jumps
 from hybrid_model.plots.style import TIME, add_label, legend, new_axes
 from hybrid_model.plots.trace import Trace, find_scalar, jump_mask
-from hybrid_model.transitions import Trigger
-from hybrid_model.variables import FloatArray, Value, Values
+from hybrid_model.record.arc import HybridArc
 
 Quantity = str | Callable[[Values], Value]
 """A scalar variable by name, or a function of all values: ``lambda s: abs(s.broadcast - s.x)``."""

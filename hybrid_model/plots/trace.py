@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hybrid_model.arc import HybridArc
+from hybrid_model.declare.variables import FloatArray, Kind, Value, Values, Variable, element_names, unknown_name
 from hybrid_model.errors import DeclarationError
 from hybrid_model.plots.curves import POINTS
 from hybrid_model.plots.style import with_unit
-from hybrid_model.variables import FloatArray, Kind, Value, Values, Variable, element_names, unknown_name
+from hybrid_model.record.arc import HybridArc
 
 POINTS_PER_FLOW = 8
 """Least number of points inside a flow: a short flight of a ball is a parabola as well."""

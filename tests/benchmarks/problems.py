@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from oracles.exact_consensus import exact_run
 
-from hybrid_model.consensus.graphs import incidence
-from hybrid_model.consensus.scenario import Scenario, load_scenario, read_scenario
+from hybrid_model.consensus.graphs.undirected import incidence
+from hybrid_model.consensus.scenario.scenario_file import Scenario, load_scenario, read_scenario
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
-from fmu.build import COMMON_FLAGS, STRICT_FLAGS, find_compiler, fmi_headers
+from fmu.build.binaries import COMMON_FLAGS, STRICT_FLAGS, find_compiler, fmi_headers
 from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall
 

@@ -12,7 +12,7 @@ from cosim.masters import run_event_exact
 from cosim.result import Ended
 from cosim.system import System
 from fmu.export import export_fmu
-from hybrid_model.consensus.network import closed_loop, scenario_agents
+from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
 from hybrid_model.models import BouncingBall
 
 from .problems import Consensus, Outcome
@@ -38,7 +38,7 @@ def simulate(problem, tolerance):
 
 
 def simulate_compiled(problem, tolerance):
-    from fmu.compiled import compiled
+    from hybrid_model.native.compiled import compiled
 
     return _simulated(problem, compiled(automaton_of(problem)), tolerance)
 

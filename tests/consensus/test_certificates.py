@@ -8,17 +8,17 @@ import pytest
 from oracles.exact_consensus import exact_run
 from scipy.integrate import quad
 
-from hybrid_model.consensus.certificates import (
+from hybrid_model.consensus.certificates.rates import (
     BoundForm,
     convergence_bound,
     default_window,
     rate_of_contraction,
     tree_free_rate,
 )
-from hybrid_model.consensus.excitation import Signal, scenario_excitation
-from hybrid_model.consensus.graphs import incidence
-from hybrid_model.consensus.scenario import Trigger, TriggerKind, load_scenario, read_scenario
-from hybrid_model.consensus.spanning_trees import TreePartition
+from hybrid_model.consensus.excitation.constants import Signal, scenario_excitation
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition
+from hybrid_model.consensus.graphs.undirected import incidence
+from hybrid_model.consensus.scenario.scenario_file import Trigger, TriggerKind, load_scenario, read_scenario
 
 
 def constant_network(agents, edges, initial, value=1.0, *, gain=1.0, threshold=0.5, decay=0.0, **more):

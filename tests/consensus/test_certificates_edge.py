@@ -13,12 +13,12 @@ from certificate_networks import WEIGHTS, drawn_scenario
 from scipy.integrate import quad
 from scipy.linalg import expm
 
-from hybrid_model.consensus.analysis import analyse
-from hybrid_model.consensus.bounds import Bounds
-from hybrid_model.consensus.certify import certify
-from hybrid_model.consensus.excitation import Signal, signal_factor
-from hybrid_model.consensus.graphs import disagreement_basis, incidence
-from hybrid_model.consensus.scenario import read_scenario
+from hybrid_model.consensus.certificates.analysis import analyse
+from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.certify import certify
+from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
 
 # What a sum over cells of k int ||N|| <= 0.01 lacks, and the steps of the runs here, second order both.
 SHORT = 2e-4

@@ -9,19 +9,19 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.analysis import analyse
-from hybrid_model.consensus.bounds import Bounds
-from hybrid_model.consensus.certify import certify
-from hybrid_model.consensus.corollary import corollary_rate, corollary_rate_exact
-from hybrid_model.consensus.energy import energy_radius
-from hybrid_model.consensus.excitation import Signal, signal_factor, window_extremes
-from hybrid_model.consensus.floquet import floquet_spectrum
-from hybrid_model.consensus.graphs import complete_edges, disagreement_basis, incidence
-from hybrid_model.consensus.joint_excitation import joint_excitation
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.certificates.analysis import analyse
+from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.certify import certify
+from hybrid_model.consensus.certificates.corollary import corollary_rate, corollary_rate_exact
+from hybrid_model.consensus.certificates.energy import energy_radius
+from hybrid_model.consensus.exact.floquet import floquet_spectrum
+from hybrid_model.consensus.excitation.constants import Signal, signal_factor, window_extremes
+from hybrid_model.consensus.excitation.joint import joint_excitation
+from hybrid_model.consensus.graphs.undirected import complete_edges, disagreement_basis, incidence
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.native.compiled import compiled
 
 PATH_RATE = 2 - math.sqrt(2)
 """Second smallest eigenvalue of the Laplacian of the path on four agents."""

@@ -14,13 +14,13 @@ from certificate_networks import SWITCHING, WEIGHTS, drawn_scenario
 from oracles.exact_consensus import exact_run
 from oracles.smooth_runs import smooth_run
 
-from hybrid_model.consensus.analysis import Analysis, analyse
-from hybrid_model.consensus.bounds import Bounds
-from hybrid_model.consensus.energy import improved_contraction
-from hybrid_model.consensus.flow_cells import flow_cells
-from hybrid_model.consensus.graphs import disagreement_basis, incidence
-from hybrid_model.consensus.scenario import read_scenario
-from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.certificates.analysis import Analysis, analyse
+from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.energy import improved_contraction
+from hybrid_model.consensus.exact.transition_grid import flow_cells
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
 
 # Grids of cells reach suprema from below by a share of the second order; runs are farther away than that. How near the
 # exact radius is to what errors can reach is the matter of test_certificates_edge.py.

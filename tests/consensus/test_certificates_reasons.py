@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.certify import certify
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import read_scenario
+from hybrid_model.consensus.certificates.certify import certify
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.native.compiled import compiled
 
 
 def network(edges, weights, *, trigger=None, agents=3, stop_time=5.0, **more):

@@ -11,22 +11,22 @@ from scipy.integrate import quad
 from scipy.linalg import expm
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.analysis import analyse
-from hybrid_model.consensus.bounds import Bounds
-from hybrid_model.consensus.certificates import BoundForm
-from hybrid_model.consensus.certify import certify
-from hybrid_model.consensus.corollary import corollary_rate, corollary_rate_exact
-from hybrid_model.consensus.floquet import floquet_spectrum, transition_matrix
-from hybrid_model.consensus.flow_cells import flow_cells
-from hybrid_model.consensus.graphs import disagreement_basis, weighted_laplacian
-from hybrid_model.consensus.joint_excitation import joint_excitation
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.reachable_sets import ReachableSets
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.trees import tree_radii
-from hybrid_model.consensus.verdicts import Verdict, statement
-from hybrid_model.consensus.worst_case import worst_case
+from hybrid_model.consensus.certificates.analysis import analyse
+from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.certify import certify
+from hybrid_model.consensus.certificates.corollary import corollary_rate, corollary_rate_exact
+from hybrid_model.consensus.certificates.rates import BoundForm
+from hybrid_model.consensus.certificates.trees import tree_radii
+from hybrid_model.consensus.certificates.verdicts import Verdict, statement
+from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
+from hybrid_model.consensus.exact.reachable_sets import ReachableSets
+from hybrid_model.consensus.exact.transition_grid import flow_cells
+from hybrid_model.consensus.exact.worst_case import worst_case
+from hybrid_model.consensus.excitation.joint import joint_excitation
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, weighted_laplacian
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.native.compiled import compiled
 
 
 def network(edges, weights, *, agents=4, trigger=None, initial=None, stop_time=5.0, **more):
@@ -344,7 +344,7 @@ class TestHypothesesThatFail:
         assert "(1 + t/" in " ".join(coarse(scenario).notes)
 
     def test_an_unexciting_tree_leaves_the_tree_free_forms(self):
-        from hybrid_model.consensus.spanning_trees import TreePartition
+        from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 
         scenario = load_scenario("paper-a-static")
         tree = TreePartition(4, scenario.network.underlying_edges, (1, 2, 6))

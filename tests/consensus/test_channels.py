@@ -13,12 +13,12 @@ from random_scenarios import random_scenario
 import hybrid_model as hm
 from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
-from fmu.compiled import compiled
-from hybrid_model.consensus.channels import link_seeds
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.scenario_data import Channel
+from hybrid_model.consensus.laws.channels import link_seeds
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_data import Channel
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.native.compiled import compiled
 
 TIME_TOLERANCE = 1e-8
 STATE_TOLERANCE = 1e-9

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hybrid_model.consensus.digraphs import (
+from hybrid_model.consensus.graphs.digraphs import (
     BalancedSwitching,
     directed_contraction,
     directed_laplacian,
@@ -11,8 +11,8 @@ from hybrid_model.consensus.digraphs import (
     random_balanced_digraph,
     symmetric_part,
 )
-from hybrid_model.consensus.generators import erdos_renyi_graph
-from hybrid_model.consensus.graphs import disagreement_basis, weighted_laplacian
+from hybrid_model.consensus.graphs.generators import erdos_renyi_graph
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, weighted_laplacian
 
 ROUNDING = 1e-9  # relative, of products of a few matrix exponentials
 

@@ -11,15 +11,15 @@ import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
-from fmu.compiled import compiled
-from hybrid_model.consensus.double_integrators import (
+from hybrid_model.consensus.laws.double_integrators import (
     double_integrator_agents,
     double_integrator_loop,
     double_integrator_wires,
 )
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.scenario_data import Channel, Trigger, TriggerKind
-from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.scenario_data import Channel, Trigger, TriggerKind
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.native.compiled import compiled
 
 DAMPING = 1.5
 

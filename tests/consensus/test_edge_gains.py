@@ -8,16 +8,16 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from hybrid_model.consensus.certificates import BoundForm
-from hybrid_model.consensus.edge_comparison import compare_edge_domain
-from hybrid_model.consensus.edge_domain import edge_domain_system
-from hybrid_model.consensus.edge_gains import edge_domain_gains, impulse_modes
-from hybrid_model.consensus.exponential_sums import absolute_integral, zeros
-from hybrid_model.consensus.floquet import floquet_spectrum, transition_matrix
-from hybrid_model.consensus.graphs import disagreement_basis, incidence
-from hybrid_model.consensus.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.certificates.edge_comparison import compare_edge_domain
+from hybrid_model.consensus.certificates.rates import BoundForm
+from hybrid_model.consensus.exact.edge_domain import edge_domain_system
+from hybrid_model.consensus.exact.edge_gains import edge_domain_gains, impulse_modes
+from hybrid_model.consensus.exact.exponential_sums import absolute_integral, zeros
+from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
+from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
 from hybrid_model.errors import DeclarationError
 from hybrid_model.linear import h_infinity_norm
 

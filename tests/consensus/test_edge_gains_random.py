@@ -13,15 +13,15 @@ from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.certificates import BoundForm
-from hybrid_model.consensus.edge_comparison import compare_edge_domain
-from hybrid_model.consensus.edge_gains import edge_domain_gains
-from hybrid_model.consensus.metrics import run_states
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain
-from hybrid_model.consensus.report import edge_norm
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
+from hybrid_model.consensus.certificates.edge_comparison import compare_edge_domain
+from hybrid_model.consensus.certificates.rates import BoundForm
+from hybrid_model.consensus.exact.edge_gains import edge_domain_gains
+from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.metrics import run_states
+from hybrid_model.consensus.runs.report import edge_norm
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.native.compiled import compiled
 
 SEEDS = [21, 23, *(pytest.param(seed, marks=pytest.mark.long) for seed in (20, 22, 24, 25, 26, 27, 28, 29))]
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, solve_ivp
 
-from hybrid_model.consensus.edge_weights import EdgeWeights
-from hybrid_model.consensus.excitation import Signal, excitation_constants, scenario_excitation, signal_factor
-from hybrid_model.consensus.floquet import floquet_spectrum, transition_matrix
-from hybrid_model.consensus.graphs import disagreement_basis, incidence
-from hybrid_model.consensus.norm_integral import NormPrimitive
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.spanning_trees import TreePartition
-from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching
-from hybrid_model.consensus.weights import ConstantWeight, GatedSine, WeightMap
+from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
+from hybrid_model.consensus.excitation.constants import Signal, excitation_constants, scenario_excitation, signal_factor
+from hybrid_model.consensus.excitation.norm_integral import NormPrimitive
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.weights.edge_weights import EdgeWeights
+from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
+from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching
 
 PUBLISHED = 1e-6  # the reference values are given with six decimals
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from hybrid_model.consensus.certificates import BoundForm, convergence_bound
-from hybrid_model.consensus.figures import (
+from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound
+from hybrid_model.consensus.figures.run import (
     COLUMN,
     plot_broadcasts,
     plot_edge_norm,
@@ -20,10 +20,10 @@ from hybrid_model.consensus.figures import (
     plot_states,
     save_paper_figures,
 )
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import load_scenario
-from hybrid_model.consensus.scenario_data import replace_trigger
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_data import replace_trigger
+from hybrid_model.consensus.scenario.scenario_file import load_scenario
 from hybrid_model.plots import JOURNAL
 
 # In 1/s: no state is faster, for two neighbours, weights up to 4 and differences of states up to 1.7. A broadcast is

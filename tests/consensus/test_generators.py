@@ -6,15 +6,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from hybrid_model.consensus.connectivity import (
-    algebraic_connectivity,
-    all_spanning_trees,
-    components,
-    joint_connectivity_window,
-    spanning_tree_count,
-    union_edges,
-)
-from hybrid_model.consensus.generators import (
+from hybrid_model.consensus.graphs.generators import (
     agent_graph,
     complete_graph,
     erdos_renyi_graph,
@@ -26,10 +18,18 @@ from hybrid_model.consensus.generators import (
     small_world_graph,
     star_graph,
 )
-from hybrid_model.consensus.graphs import disagreement_basis, incidence, laplacian
-from hybrid_model.consensus.random_switching import random_dwell_sequence
-from hybrid_model.consensus.spanning_trees import TreePartition, is_connected
-from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching, SwitchingSequence
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition, is_connected
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence, laplacian
+from hybrid_model.consensus.weights.connectivity import (
+    algebraic_connectivity,
+    all_spanning_trees,
+    components,
+    joint_connectivity_window,
+    spanning_tree_count,
+    union_edges,
+)
+from hybrid_model.consensus.weights.random_switching import random_dwell_sequence
+from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching, SwitchingSequence
 
 ROUNDING = 1e-10  # eigenvalues of matrices of size <= 9 with entries of order 1
 

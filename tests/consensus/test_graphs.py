@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybrid_model.consensus.graphs import (
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition, is_connected, spanning_tree
+from hybrid_model.consensus.graphs.undirected import (
     complete_edges,
     disagreement_basis,
     edge_laplacian,
@@ -17,7 +18,6 @@ from hybrid_model.consensus.graphs import (
     validate_edges,
     weighted_laplacian,
 )
-from hybrid_model.consensus.spanning_trees import TreePartition, is_connected, spanning_tree
 
 K4 = complete_edges(4, ((1, 2), (2, 3), (3, 4), (4, 1)))
 ROUNDING = 1e-12  # matrices of size <= 8 with entries of order 1

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybrid_model.consensus.reachable_sets import _support
+from hybrid_model.consensus.exact.reachable_sets import _support
 
 
 def one_by_one(generators, monodromy, direction, tail):

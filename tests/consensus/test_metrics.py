@@ -9,8 +9,8 @@ import pytest
 from scipy.integrate import quad
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.metrics import (
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.metrics import (
     communication,
     gap_statistics,
     performance,
@@ -18,12 +18,12 @@ from hybrid_model.consensus.metrics import (
     run_states,
     settling_time,
 )
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.periodic_run import periodic_run, slow_gain
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.savings import Measure, run_savings
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.runs.periodic_run import periodic_run, slow_gain
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.runs.savings import Measure, run_savings
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.native.compiled import compiled
 
 
 def pair(trigger, stop_time=6.0):

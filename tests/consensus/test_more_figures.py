@@ -11,27 +11,27 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.figure_runs import (
+from hybrid_model.consensus.figures.details import (
     plot_all_errors,
     plot_broadcasts_and_weights,
     plot_disagreement,
     plot_gap_histogram,
     plot_gaps_against_bounds,
 )
-from hybrid_model.consensus.figure_sweeps import (
+from hybrid_model.consensus.figures.run import COLUMN, plot_error_against_threshold
+from hybrid_model.consensus.figures.sweeps import (
     plot_against_parameter,
     plot_conservatism,
     plot_radius_against,
     plot_rate_against,
 )
-from hybrid_model.consensus.figures import COLUMN, plot_error_against_threshold
-from hybrid_model.consensus.metrics import run_states
-from hybrid_model.consensus.network import closed_loop, edges_of
-from hybrid_model.consensus.periodic_run import periodic_run
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import load_scenario
-from hybrid_model.consensus.scenario_data import Trigger, TriggerKind
+from hybrid_model.consensus.laws.closed_loop import closed_loop, edges_of
+from hybrid_model.consensus.runs.metrics import run_states
+from hybrid_model.consensus.runs.periodic_run import periodic_run
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.native.compiled import compiled
 from hybrid_model.plots import JOURNAL
 
 

@@ -11,18 +11,18 @@ from own_importer import Exchange, Importer
 from scipy.integrate import quad
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.carriers import UnitCarrier
-from hybrid_model.consensus.edge_blocks import weights_block
-from hybrid_model.consensus.edge_weights import EdgeWeights
-from hybrid_model.consensus.forecast import Wave
-from hybrid_model.consensus.function_weights import FunctionWeight, distance_weights, reliability_weight
-from hybrid_model.consensus.gating import half_wave_boundary
-from hybrid_model.consensus.row_clock import RowClock, row_begin, row_number
-from hybrid_model.consensus.switching import NoSwitching, SwitchingSequence
-from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
-from hybrid_model.consensus.wave_weights import SineWeight, SquareWeight
-from hybrid_model.consensus.waveform import Waveform
+from hybrid_model.consensus.laws.forecast import Wave
+from hybrid_model.consensus.weights.blocks import weights_block
+from hybrid_model.consensus.weights.carriers import UnitCarrier
+from hybrid_model.consensus.weights.clockwork import half_wave_boundary
+from hybrid_model.consensus.weights.edge_weights import EdgeWeights
+from hybrid_model.consensus.weights.functions import FunctionWeight, distance_weights, reliability_weight
+from hybrid_model.consensus.weights.row_clock import RowClock, row_begin, row_number
+from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingSequence
+from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
+from hybrid_model.consensus.weights.waveform import Waveform
+from hybrid_model.consensus.weights.waves import SineWeight, SquareWeight
+from hybrid_model.native.compiled import compiled
 
 rates = st.floats(0.05, 20.0)
 phases = st.floats(-20.0, 20.0)

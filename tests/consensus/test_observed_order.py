@@ -3,10 +3,10 @@
 import pytest
 
 import hybrid_model as hm
-from hybrid_model.consensus.certify import certify
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import read_scenario
+from hybrid_model.consensus.certificates.certify import certify
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
 
 
 def pair(stop_time, initial, **trigger):

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus import counterexamples
-from hybrid_model.consensus.analysis import analyse
-from hybrid_model.consensus.bounds import Bounds
-from hybrid_model.consensus.certificates import BoundForm, convergence_bound
-from hybrid_model.consensus.corollary import corollary_rate
-from hybrid_model.consensus.graphs import weighted_laplacian
-from hybrid_model.consensus.joint_excitation import joint_excitation
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import load_scenario
-from hybrid_model.consensus.spanning_trees import TreePartition
-from hybrid_model.consensus.verdicts import STATEMENTS, Verdict
+from hybrid_model.consensus.certificates import counterexamples
+from hybrid_model.consensus.certificates.analysis import analyse
+from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.corollary import corollary_rate
+from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound
+from hybrid_model.consensus.certificates.verdicts import STATEMENTS, Verdict
+from hybrid_model.consensus.excitation.joint import joint_excitation
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition
+from hybrid_model.consensus.graphs.undirected import weighted_laplacian
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.native.compiled import compiled
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "paper-audit.md"

@@ -11,15 +11,15 @@ from oracles.exact_consensus import exact_run
 from scipy.linalg import expm
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.excitation import Signal, signal_factor
-from hybrid_model.consensus.floquet import floquet_spectrum, transition_matrix
-from hybrid_model.consensus.graphs import complete_edges
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.report import edge_norm, run_report
-from hybrid_model.consensus.scenario import load_scenario, preset_names, read_scenario
-from hybrid_model.consensus.weights import WeightMap
-from hybrid_model.consensus.windows import RateForm, best_window, rate_over_window
+from hybrid_model.consensus.certificates.windows import RateForm, best_window, rate_over_window
+from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
+from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.graphs.undirected import complete_edges
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.report import edge_norm, run_report
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, preset_names, read_scenario
+from hybrid_model.consensus.weights.gated_sine import WeightMap
+from hybrid_model.native.compiled import compiled
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "presets.md").read_text(encoding="utf-8")

@@ -6,14 +6,20 @@ import math
 import numpy as np
 import pytest
 
-from hybrid_model.consensus.function_weights import FunctionWeight
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import ScenarioError, WeightKind, Weights, load_scenario, read_scenario
-from hybrid_model.consensus.scenario_data import Scenario
-from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching, SwitchingSequence
-from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
-from hybrid_model.consensus.wave_weights import SineWeight, SquareWeight
-from hybrid_model.consensus.weights import GatedSine, WeightMap
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.scenario_file import (
+    ScenarioError,
+    WeightKind,
+    Weights,
+    load_scenario,
+    read_scenario,
+)
+from hybrid_model.consensus.weights.functions import FunctionWeight
+from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
+from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching, SwitchingSequence
+from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
+from hybrid_model.consensus.weights.waves import SineWeight, SquareWeight
 
 BASE = {
     "name": "three",

@@ -9,9 +9,9 @@ from oracles.exact_consensus import exact_run
 import hybrid_model as hm
 from cosim.consensus import fmu_system, in_process_system, network_report
 from cosim.masters import run_event_exact
-from hybrid_model.consensus.network import closed_loop, scenario_agents
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
+from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
 
 # The limits. Events amplify errors where thresholds have decayed, so random scenarios stay short.
 TIME_TOLERANCE = 1e-8

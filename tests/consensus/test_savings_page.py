@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.metrics import performance, run_states
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.periodic_run import periodic_run, slow_gain
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.savings import Measure, run_savings
-from hybrid_model.consensus.scenario import load_scenario
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.metrics import performance, run_states
+from hybrid_model.consensus.runs.periodic_run import periodic_run, slow_gain
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.runs.savings import Measure, run_savings
+from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.native.compiled import compiled
 
 PAGE = (Path(__file__).parents[2] / "docs" / "savings.md").read_text(encoding="utf-8")
 ROWS = {

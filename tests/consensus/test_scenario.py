@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from hybrid_model.consensus.graphs import complete_edges
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import (
+from hybrid_model.consensus.graphs.undirected import complete_edges
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import (
     NoSwitching,
     PeriodicSwitching,
     ScenarioError,
@@ -21,7 +21,7 @@ from hybrid_model.consensus.scenario import (
     read_scenario,
     replace_trigger,
 )
-from hybrid_model.consensus.weights import ConstantWeight, GatedSine, WeightMap
+from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
 
 VALID = {
     "name": "three",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cosim.cli.main import main
-from hybrid_model.consensus.scenario import ScenarioError, load_scenario, read_scenario
+from hybrid_model.consensus.scenario.scenario_file import ScenarioError, load_scenario, read_scenario
 
 BASE = {
     "name": "three",

@@ -14,13 +14,13 @@ from scipy.optimize import brentq
 import hybrid_model as hm
 from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
-from fmu.compiled import compiled
-from hybrid_model.consensus.forecast import Forecast, Wave
-from hybrid_model.consensus.network import closed_loop, scenario_agents
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.scenario_data import Trigger, TriggerKind
-from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
+from hybrid_model.consensus.laws.forecast import Forecast, Wave
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.native.compiled import compiled
 
 TIME_TOLERANCE = 1e-8
 STATE_TOLERANCE = 1e-9

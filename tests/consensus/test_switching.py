@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from hybrid_model.consensus.edge_weights import EdgeWeights
-from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching
-from hybrid_model.consensus.weights import ConstantWeight, GatedSine, WeightMap
+from hybrid_model.consensus.weights.edge_weights import EdgeWeights
+from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
+from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching
 
 TWO_TREES = PeriodicSwitching(math.pi, ((1, 2, 3), (2, 3, 4)), 4)
 MIXED = EdgeWeights(

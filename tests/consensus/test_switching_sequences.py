@@ -8,14 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybrid_model.consensus.graphs import complete_edges
-from hybrid_model.consensus.random_switching import (
+from hybrid_model.consensus.graphs.undirected import complete_edges
+from hybrid_model.consensus.weights.random_switching import (
     Order,
     jointly_connected_sequence,
     markov_sequence,
     random_dwell_sequence,
 )
-from hybrid_model.consensus.switching import PeriodicSwitching, SwitchingSequence
+from hybrid_model.consensus.weights.switching import PeriodicSwitching, SwitchingSequence
 
 THREE = ((1, 2), (2, 3), ())
 LISTED = SwitchingSequence((0.5, 1.25, 0.25), THREE, 3, repeat=True)

@@ -8,10 +8,10 @@ from hypothesis import strategies as st
 from oracles.table_runs import table_run
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import read_scenario, replace_trigger
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_file import read_scenario, replace_trigger
+from hybrid_model.native.compiled import compiled
 
 # The limits for times of events and for states.
 TIME_TOLERANCE = 1e-7

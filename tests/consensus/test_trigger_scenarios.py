@@ -11,12 +11,12 @@ import hybrid_model as hm
 from cosim.consensus import fmu_system, in_process_system, network_report
 from cosim.errors import MisfitError
 from cosim.masters import run_event_exact
-from fmu.compiled import compiled
-from hybrid_model.consensus.network import closed_loop, scenario_agents
-from hybrid_model.consensus.report import run_report
-from hybrid_model.consensus.scenario import read_scenario, replace_trigger
-from hybrid_model.consensus.scenario_data import Channel, Trigger, TriggerKind
-from hybrid_model.consensus.tables import ScenarioError
+from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_data import Channel, Trigger, TriggerKind
+from hybrid_model.consensus.scenario.scenario_file import read_scenario, replace_trigger
+from hybrid_model.native.compiled import compiled
 
 # The limits of the agreement test.
 TIME_TOLERANCE = 1e-7

@@ -10,9 +10,7 @@ import pytest
 from oracles.exact_consensus import exact_run
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from hybrid_model.consensus.certificates import BoundForm, convergence_bound
-from hybrid_model.consensus.counterexamples import (
+from hybrid_model.consensus.certificates.counterexamples import (
     certifiable_rate,
     corrected_gap_without_kappa1,
     derivative_at_own_event,
@@ -27,14 +25,16 @@ from hybrid_model.consensus.counterexamples import (
     valid_sum,
     vanishing_weights,
 )
-from hybrid_model.consensus.excitation import Signal, signal_factor
-from hybrid_model.consensus.floquet import transition_matrix
-from hybrid_model.consensus.graphs import complete_edges, disagreement_basis, incidence, weighted_laplacian
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import load_scenario, read_scenario
-from hybrid_model.consensus.spanning_trees import TreePartition
-from hybrid_model.consensus.trigger_data import Trigger, TriggerKind
-from hybrid_model.consensus.weights import WeightMap
+from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound
+from hybrid_model.consensus.exact.floquet import transition_matrix
+from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition
+from hybrid_model.consensus.graphs.undirected import complete_edges, disagreement_basis, incidence, weighted_laplacian
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.weights.gated_sine import WeightMap
+from hybrid_model.native.compiled import compiled
 
 STAR, PATH = ((1, 2), (1, 3), (1, 4)), ((1, 2), (2, 3), (3, 4))
 

@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from hybrid_model.consensus.gating import dwell_boundary, dwell_index
-from hybrid_model.consensus.periods import common_period
-from hybrid_model.consensus.weights import (
+from hybrid_model.consensus.weights.clockwork import dwell_boundary, dwell_index
+from hybrid_model.consensus.weights.gated_sine import (
     ConstantWeight,
     GatedSine,
     WeightMap,
@@ -22,6 +21,7 @@ from hybrid_model.consensus.weights import (
     half_wave,
     half_wave_boundary,
 )
+from hybrid_model.consensus.weights.periods import common_period
 
 rates = st.floats(0.05, 30.0)
 phases = st.floats(-20.0, 20.0)

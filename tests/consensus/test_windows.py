@@ -9,30 +9,30 @@ from catalogue_weights import SWITCHING, WEIGHTS, moving_agents, ring
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybrid_model.consensus.certificates import BoundForm, convergence_bound, tree_free_rate
-from hybrid_model.consensus.edge_weights import EdgeWeights
-from hybrid_model.consensus.excitation import (
-    Signal,
-    excitation_constants,
-    scenario_excitation,
-    signal_factor,
-    window_extremes,
-)
-from hybrid_model.consensus.floquet import floquet_spectrum
-from hybrid_model.consensus.function_weights import FunctionWeight
-from hybrid_model.consensus.joint_excitation import joint_excitation, tree_excitations
-from hybrid_model.consensus.scenario import load_scenario, preset_names
-from hybrid_model.consensus.spanning_trees import TreePartition
-from hybrid_model.consensus.switching import NoSwitching
-from hybrid_model.consensus.table_weights import PiecewiseWeight
-from hybrid_model.consensus.wave_weights import SineWeight
-from hybrid_model.consensus.windows import (
+from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound, tree_free_rate
+from hybrid_model.consensus.certificates.windows import (
     RateForm,
     best_window,
     rate_over_window,
     search_window,
     shortest_exciting_window,
 )
+from hybrid_model.consensus.exact.floquet import floquet_spectrum
+from hybrid_model.consensus.excitation.constants import (
+    Signal,
+    excitation_constants,
+    scenario_excitation,
+    signal_factor,
+    window_extremes,
+)
+from hybrid_model.consensus.excitation.joint import joint_excitation, tree_excitations
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition
+from hybrid_model.consensus.scenario.scenario_file import load_scenario, preset_names
+from hybrid_model.consensus.weights.edge_weights import EdgeWeights
+from hybrid_model.consensus.weights.functions import FunctionWeight
+from hybrid_model.consensus.weights.switching import NoSwitching
+from hybrid_model.consensus.weights.tables import PiecewiseWeight
+from hybrid_model.consensus.weights.waves import SineWeight
 
 PERIODIC = {
     "sine": {"kind": "sine", "mean": [0.5, 1.0, 0.7, 0.3], "depth": 0.9, "rate": [1.0, 2.0, 3.0, 1.5], "phase": 0.4},

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from strangers import write_stranger3
 
-from fmu.build import fmi_headers
+from fmu.build.binaries import fmi_headers
 
 HERE = Path(__file__).parent
 

@@ -8,10 +8,10 @@ import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.cli.main import main
 from cosim.errors import CosimError, MisfitError
+from cosim.flow_functions import FlowError, FlowFunctions
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.system import System
-from fmu.flow_functions import FlowError, FlowFunctions
 
 
 def echoed(path, kind, text):

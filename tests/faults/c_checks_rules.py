@@ -14,7 +14,7 @@ from c_witnesses import WITNESSES
 from witnesses import Ramps
 
 import hybrid_model as hm
-from fmu.variables import Bank
+from fmu.describe.variables import Bank
 from hybrid_model.models import BouncingBall
 
 TESTED = ("ball", "ramps", "timers", "mix", "flow_first")

@@ -12,11 +12,11 @@ import struct
 import subprocess
 from pathlib import Path
 
-from fmu.build import RUNTIME, find_compiler, fmi_headers, runtime_sources
-from fmu.code import model_code
-from fmu.trace import trace
-from fmu.variables import Fmi, fmu_variables
+from fmu.build.binaries import OWN_FOLDERS, find_compiler, fmi_headers, own_files, runtime_sources
+from fmu.build.model_code import model_code
+from fmu.describe.variables import Fmi, fmu_variables
 from hybrid_model import Automaton
+from hybrid_model.native.trace import trace
 
 HERE = Path(__file__).parent
 TOKEN = "0123456789abcdef0123456789abcdef"
@@ -77,14 +77,14 @@ class Builder:
         return program
 
     def _object(self, name, text, flags):
-        headers = "".join(path.read_text() for path in sorted([*RUNTIME.glob("*.h"), *HERE.glob("*.h")]))
+        headers = "".join(path.read_text() for path in sorted([*own_files("*.h"), *HERE.glob("*.h")]))
         key = hashlib.sha256(repr((name, text, flags, headers)).encode()).hexdigest()[:20]
         target = self.folder / f"{key}.o"
         if not target.exists():
             place = self.folder / f"{key}-{os.getpid()}"
             place.mkdir()
             (place / name).write_text(text)
-            includes = [f"-I{RUNTIME}", f"-I{HERE}", "-isystem", str(fmi_headers())]
+            includes = [*(f"-I{folder}" for folder in (*OWN_FOLDERS, HERE)), "-isystem", str(fmi_headers())]
             run(*find_compiler(), *flags, *includes, "-c", str(place / name), "-o", str(place / "made.o"))
             os.replace(place / "made.o", target)
         return target

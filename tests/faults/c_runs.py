@@ -9,9 +9,9 @@ import numpy as np
 from c_harness import NONE, Instance
 
 import hybrid_model as hm
-from fmu.trace import trace
-from fmu.variables import Bank, FmiType
-from hybrid_model.transitions import Trigger
+from fmu.describe.variables import Bank, FmiType
+from hybrid_model.declare.transitions import Trigger
+from hybrid_model.native.trace import trace
 
 STATE_TOLERANCE = 1e-8  # the project's limit for states
 TIME_TOLERANCE = 1e-7  # and for times of events

@@ -10,10 +10,10 @@ import pytest
 from c_harness import VERSIONS, generated, run
 from c_witnesses import WITNESSES
 
-from fmu.build import RUNTIME, STRICT_FLAGS, find_compiler, fmi_headers, runtime_sources
+from fmu.build.binaries import OWN_FOLDERS, STRICT_FLAGS, find_compiler, fmi_headers, own_files, runtime_sources
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="gcc and binutils on Linux")
-SOURCES = sorted(RUNTIME.glob("*.c"))
+SOURCES = own_files("*.c")
 
 
 def is_gcc():
@@ -23,7 +23,7 @@ def is_gcc():
 def compile_all(sources, folder, *flags):
     """What the compiler says of sources, which must be nothing."""
     for source in sources:
-        command = [*find_compiler(), *flags, f"-I{RUNTIME}", "-isystem", str(fmi_headers())]
+        command = [*find_compiler(), *flags, *(f"-I{place}" for place in OWN_FOLDERS), "-isystem", str(fmi_headers())]
         done = subprocess.run(
             [*command, "-c", str(source), "-o", str(folder / f"{source.stem}.o")],
             capture_output=True,
@@ -110,8 +110,8 @@ def lines_of(path):
 
 def test_the_layers_of_the_versions_share_little():
     """Even with the names of both versions made equal, under a fifth of either occurs in the other."""
-    second = lines_of(RUNTIME / "fmi2.c")
-    third = [*itertools.chain.from_iterable(map(lines_of, sorted(RUNTIME.glob("fmi3*.c"))))]
+    second = lines_of(*own_files("fmi2.c"))
+    third = [*itertools.chain.from_iterable(map(lines_of, own_files("fmi3*.c")))]
     for one, other in ((second, third), (third, second)):
         known = set(other)
         shared = [line for line in one if line in known]
@@ -120,7 +120,7 @@ def test_the_layers_of_the_versions_share_little():
 
 def test_layers_hold_no_logic_of_the_engine():
     """They translate: only what belongs to one version stands in its files, the engine's parts are out of reach."""
-    for path in RUNTIME.glob("fmi*.c"):
+    for path in own_files("fmi*.c"):
         text = path.read_text()
         assert "parts.h" not in re.findall(r'#include "([^"]*)"', text), path.name
         assert "malloc" not in text

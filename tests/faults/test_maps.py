@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from catalogue import cases
 
-from fmu.build import COMMON_FLAGS, RUNTIME, find_compiler
-from fmu.code import model_code
-from fmu.trace import trace
-from fmu.variables import Fmi, fmu_variables
-from hybrid_model.variables import Kind
+from fmu.build.binaries import COMMON_FLAGS, OWN_FOLDERS, find_compiler
+from fmu.build.model_code import model_code
+from fmu.describe.variables import Fmi, fmu_variables
+from hybrid_model.declare.variables import Kind
+from hybrid_model.native.trace import trace
 
 pytestmark = pytest.mark.faults
 POINTS = 100_000
@@ -48,7 +48,7 @@ class Maps:
         library = folder / "maps.so"
         flags = [flag for flag in COMMON_FLAGS if flag != "-fvisibility=hidden"]
         subprocess.run(
-            [*find_compiler(), *flags, f"-I{RUNTIME}", "-shared", "-o", str(library)]
+            [*find_compiler(), *flags, *(f"-I{folder}" for folder in OWN_FOLDERS), "-shared", "-o", str(library)]
             + [str(folder / name) for name in ("model.c", "hands_on.c")]
             + ["-lm"],
             check=True,

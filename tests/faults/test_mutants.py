@@ -10,7 +10,7 @@ from c_checks_runs import RUN_CHECKS
 from c_harness import Fallen, Harness, generated
 from mutants import MUTANTS
 
-from fmu.build import RUNTIME
+from fmu.build.binaries import own_files
 
 pytestmark = pytest.mark.faults
 CHECKS = RUN_CHECKS | RULE_CHECKS
@@ -52,7 +52,7 @@ def test_there_are_enough_of_them():
 
 @pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.name)
 def test_killed(mutant, builder):
-    text = (RUNTIME / mutant.file).read_text()
+    text = own_files(mutant.file)[0].read_text()
     assert text.count(mutant.old) == 1, "the table and the runtime do not fit together any more"
     changed = {mutant.file: text.replace(mutant.old, mutant.new)}
     fault = judge(builder, changed, order(mutant.first))

@@ -9,7 +9,7 @@ import pytest
 from c_harness import VERSIONS
 from witnesses import Mix
 
-from fmu.build import RUNTIME, find_compiler, fmi_headers, runtime_sources
+from fmu.build.binaries import OWN_FOLDERS, find_compiler, fmi_headers, runtime_sources
 from fmu.export import export_fmu
 
 pytestmark = [
@@ -51,7 +51,7 @@ def test_fmpy_runs_it_without_a_word(fmi, tmp_path):
     flags += [
         "-fsanitize=address,undefined",
         "-fno-sanitize-recover=all",
-        f"-I{RUNTIME}",
+        *(f"-I{folder}" for folder in OWN_FOLDERS),
         "-isystem",
         str(fmi_headers()),
     ]

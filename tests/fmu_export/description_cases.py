@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from lxml import etree
 
 import hybrid_model as hm
-from fmu.description_parts import Description
-from fmu.trace import trace
-from fmu.variables import Fmi, fmu_variables
+from fmu.describe.parts import Description
+from fmu.describe.variables import Fmi, fmu_variables
+from hybrid_model.native.trace import trace
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
 BOTH = (Fmi.V2_0, Fmi.V3_0)

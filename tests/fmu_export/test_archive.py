@@ -15,14 +15,14 @@ from description_cases import BOTH, findings, schema
 from lxml import etree
 
 import hybrid_model as hm
-from fmu.archive import archive_content
-from fmu.build import package
-from fmu.code import model_code
-from fmu.experiment import round_step
-from fmu.reference_results import FOLDER
-from fmu.trace import trace
-from fmu.variables import Fmi, fmu_variables
+from fmu.build.binaries import package
+from fmu.build.content import archive_content
+from fmu.build.model_code import model_code
+from fmu.describe.experiment import round_step
+from fmu.describe.reference_results import FOLDER
+from fmu.describe.variables import Fmi, fmu_variables
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.trace import trace
 
 TOKEN = "0123456789abcdef0123456789abcdef"
 KINDS = ("cs", "me")

@@ -11,9 +11,9 @@ import zipfile
 import pytest
 from catalogue import cases
 
-from fmu.build import RUNTIME, find_compiler, fmi_headers
+from fmu.build.binaries import OWN_FOLDERS, find_compiler, fmi_headers, own_files
+from fmu.describe.variables import Fmi
 from fmu.export import export_fmu
-from fmu.variables import Fmi
 from hybrid_model.models import BouncingBall
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="reads ELF files by the tools of binutils")
@@ -86,11 +86,17 @@ def test_is_as_hardened_systems_want_it(fmi, binary):
 @needs_tools
 def test_the_runtime_has_no_writable_globals(tmp_path):
     """Two instances share nothing: no object file of the runtime has data that can be written."""
-    for source in RUNTIME.glob("*.c"):
+    for source in own_files("*.c"):
         target = tmp_path / f"{source.stem}.o"
         # Without position independence, tables of pointers are constants for nm as well.
-        flags = ["-std=c99", "-O2", "-fno-pic", "-fno-pie", "-c", f"-I{fmi_headers()}", str(source), "-o", str(target)]
-        subprocess.run([*find_compiler(), *flags], check=True)
+        flags = [
+            "-std=c99",
+            "-O2",
+            "-fno-pic",
+            "-fno-pie",
+            *(f"-I{folder}" for folder in (*OWN_FOLDERS, fmi_headers())),
+        ]
+        subprocess.run([*find_compiler(), *flags, "-c", str(source), "-o", str(target)], check=True)
         writable = [line for line in run("nm", target).splitlines() if re.search(r" [bBdDcCsSgG] ", line)]
         assert writable == [], source.name
 
@@ -117,7 +123,7 @@ def test_functions_of_the_host_do_not_replace_its_own(fmi, binary, tmp_path):
 
 def _internal_names():
     """Functions that one file of the runtime calls in another."""
-    text = "".join(source.read_text() for source in RUNTIME.glob("*.c"))
+    text = "".join(source.read_text() for source in own_files("*.c"))
     return set(re.findall(r"^(?:\w+ )+\*?(\w+)\([^;]*\)\n\{", text, re.MULTILINE)) - set(re.findall(r"fmi\w+", text))
 
 

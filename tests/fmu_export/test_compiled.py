@@ -5,9 +5,9 @@ import pytest
 from catalogue import cases
 
 import hybrid_model as hm
-from fmu.compiled import compiled
-from fmu.errors import TraceError
-from hybrid_model.variables import Kind
+from hybrid_model.declare.variables import Kind
+from hybrid_model.errors import TraceError
+from hybrid_model.native.compiled import compiled
 
 
 @pytest.mark.parametrize("name", list(cases()))

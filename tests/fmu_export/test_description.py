@@ -9,10 +9,10 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import hybrid_model as hm
+from fmu.describe.variables import fmu_variables
 from fmu.errors import ExportError
 from fmu.export import export_fmu
-from fmu.trace import trace
-from fmu.variables import fmu_variables
+from hybrid_model.native.trace import trace
 
 QUICK = ("bouncing_ball", "agent2_dynamic", "thermostat", "newtons_cradle")
 """fmpy takes its time with names of many parts."""

@@ -8,11 +8,11 @@ from description_cases import BOTH, described, elements, findings, schema
 from lxml import etree
 
 import hybrid_model as hm
-from fmu.description import model_description
-from fmu.description_fmi2 import fmi2_description
-from fmu.description_fmi3 import fmi3_description
-from fmu.description_parts import number, summary
-from fmu.variables import Bank, Fmi
+from fmu.describe.description import model_description
+from fmu.describe.fmi2 import fmi2_description
+from fmu.describe.fmi3 import fmi3_description
+from fmu.describe.parts import number, summary
+from fmu.describe.variables import Bank, Fmi
 from hybrid_model.models import BouncingBall
 
 WRITERS = {Fmi.V2_0: fmi2_description, Fmi.V3_0: fmi3_description}

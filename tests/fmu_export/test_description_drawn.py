@@ -5,10 +5,10 @@ from description_cases import BOTH, described, drawn_automata, elements, finding
 from hypothesis import HealthCheck, given, settings
 from lxml import etree
 
-from fmu.description import model_description
+from fmu.describe.description import model_description
+from fmu.describe.terminals import terminals_and_icons
+from fmu.describe.variables import Fmi
 from fmu.errors import ExportError
-from fmu.terminals import terminals_and_icons
-from fmu.variables import Fmi
 
 SCHEMAS = {fmi: schema(fmi) for fmi in BOTH}
 TERMINALS = schema(Fmi.V3_0, "TerminalsAndIcons")

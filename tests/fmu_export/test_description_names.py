@@ -5,7 +5,7 @@ from fmpy.validation import _validate_variable_names
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmu.description_names import structured_name, variable_names
+from fmu.describe.names import structured_name, variable_names
 from fmu.errors import ExportError
 
 

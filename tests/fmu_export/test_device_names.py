@@ -6,8 +6,8 @@ import fmpy
 import pytest
 
 from cosim.cli.main import main
-from fmu.description import model_identifier
-from fmu.device_names import is_device, no_device
+from fmu.archives.device_names import is_device, no_device
+from fmu.describe.description import model_identifier
 
 
 @pytest.mark.parametrize("name", ["Aux", "Nul", "CON", "com1", "LPT9", "prn"])

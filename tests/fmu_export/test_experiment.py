@@ -6,11 +6,11 @@ import xml.etree.ElementTree as ET
 import pytest
 
 import hybrid_model as hm
-from fmu.archive import archive_content
-from fmu.experiment import declared_times, proposed_step
-from fmu.trace import trace
-from fmu.variables import Fmi, fmu_variables
+from fmu.build.content import archive_content
+from fmu.describe.experiment import declared_times, proposed_step
+from fmu.describe.variables import Fmi, fmu_variables
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.trace import trace
 
 
 class Timed(hm.HybridAutomaton):

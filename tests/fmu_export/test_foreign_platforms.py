@@ -15,10 +15,10 @@ import pytest
 from catalogue import cases
 from fmpy import read_model_description
 
-from fmu.build import fmi_headers
-from fmu.compiler import cache_folder, find_compiler, zig_compiler
+from fmu.build.binaries import fmi_headers
+from fmu.build.compiler import cache_folder, find_compiler, zig_compiler
+from fmu.build.platforms import PLATFORMS, this_platform
 from fmu.export import export_fmu
-from fmu.platforms import PLATFORMS, this_platform
 
 pytestmark = [
     pytest.mark.long,

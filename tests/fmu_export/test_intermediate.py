@@ -12,7 +12,7 @@ from witnesses import Cascade, Mix, Ramps
 from witnesses_driven import Tank
 
 import hybrid_model as hm
-from hybrid_model.consensus.edges import GatedSineWeights
+from hybrid_model.consensus.weights.automata import GatedSineWeights
 
 NOT_YET_KNOWN, UNCHANGED, CHANGED = range(3)
 USES = pytest.mark.parametrize(

@@ -13,8 +13,8 @@ from cosim.automaton_slave import AutomatonSlave
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
-from fmu.build import RUNTIME
-from hybrid_model.locate import HALVINGS, POINTS, TO_BERNSTEIN, TO_TAIL
+from fmu.build.binaries import own_files
+from hybrid_model.reference.locate import HALVINGS, POINTS, TO_BERNSTEIN, TO_TAIL
 
 EXECUTIONS = pytest.mark.parametrize("execution", ["python", "in process", "fmu"])
 BELOW = 1e-12
@@ -208,7 +208,7 @@ def test_steps_hold_many_periods():
 
 
 def test_the_tables_of_the_runtime_are_those_of_python():
-    text = (RUNTIME / "rises.c").read_text()
+    text = own_files("rises.c")[0].read_text()
 
     def table(name, columns):
         body = re.search(rf"{name}[^=]*= \{{(.*?)\}};", text, flags=re.DOTALL)[1]
@@ -220,7 +220,7 @@ def test_the_tables_of_the_runtime_are_those_of_python():
     np.testing.assert_allclose(table("POINTS", 1)[:, 0], POINTS, rtol=0, atol=1e-15)
     np.testing.assert_allclose(contribution[:, :-2].T, TO_BERNSTEIN, rtol=0, atol=1e-12)
     np.testing.assert_allclose(contribution[:, -2:].T, TO_TAIL, rtol=0, atol=1e-15)
-    assert int(re.search(r"HALVINGS (\d+)", (RUNTIME / "search.h").read_text())[1]) == HALVINGS
+    assert int(re.search(r"HALVINGS (\d+)", own_files("search.h")[0].read_text())[1]) == HALVINGS
     # The quick exclusion rests on this bound of what samples between the ends contribute.
     factor = float(re.search(r"BEND_FACTOR (\S+)", text)[1])
     weights = np.abs(contribution[1:-1])

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from fmu.names import NameTable
+from hybrid_model.native.names import NameTable
 
 NAMES = ["x", "agent1.x", "agent1.weights.phase[3]", "der(agent2.x)", "margin.agent2.jump", "Höhe.h", 'a."b"\\?', ""]
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.errors import TraceError
-from fmu.network import NetworkTrace, NotLoopable, network_trace, trace_any, worth_looping
-from fmu.trace import Trace
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import read_scenario
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.errors import TraceError
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.networks.network import NetworkTrace, NotLoopable, network_trace, trace_any, worth_looping
+from hybrid_model.native.trace import Trace
 
 
 class Part(hm.HybridAutomaton):

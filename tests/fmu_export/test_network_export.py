@@ -9,11 +9,11 @@ import pytest
 from fmpy.fmi3 import FMU3Slave
 
 import hybrid_model as hm
-from fmu.compiled import compiled
 from fmu.export import export_fmu
-from fmu.network import worth_looping
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import read_scenario
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.native.compiled import compiled
+from hybrid_model.native.networks.network import worth_looping
 
 
 def network(agents, weights="constant", seed=1):

@@ -9,14 +9,14 @@ import pytest
 from catalogue import cases
 
 import hybrid_model as hm
-from fmu.build import GENERATED_FLAGS, RUNTIME, STRICT_FLAGS, find_compiler
-from fmu.network import network_trace
-from fmu.trace import trace
-from hybrid_model.consensus.network import closed_loop
-from hybrid_model.consensus.scenario import read_scenario
+from fmu.build.binaries import GENERATED_FLAGS, OWN_FOLDERS, STRICT_FLAGS, find_compiler, own_files
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.declare.transitions import Trigger
+from hybrid_model.declare.variables import Kind
 from hybrid_model.models import BouncingBall
-from hybrid_model.transitions import Trigger
-from hybrid_model.variables import Kind
+from hybrid_model.native.networks.network import network_trace
+from hybrid_model.native.trace import trace
 
 KINDS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
 FUNCTIONS = ("start", "flow", "flow_set", "margins", "times", "outputs")
@@ -42,12 +42,19 @@ class Compiled:
             "{ return hybrid_reset(jump, arg, res, iw, w); }\n"
         )
         source.write_text(traced.c_code() + "".join(calls), encoding="ascii")
-        common = [*find_compiler(), "-std=c99", "-O1", "-fPIC", "-ffp-contract=off", f"-I{RUNTIME}"]
+        common = [
+            *find_compiler(),
+            "-std=c99",
+            "-O1",
+            "-fPIC",
+            "-ffp-contract=off",
+            *(f"-I{folder}" for folder in OWN_FOLDERS),
+        ]
         generated, library = folder / "model.o", folder / "model.so"
         subprocess.run([*common, *GENERATED_FLAGS, "-Werror", "-c", source, "-o", generated], check=True)
-        runtime = [folder / f"{source.stem}.o" for source in RUNTIME.glob("network*.c")]
-        for target in runtime:
-            subprocess.run([*common, *STRICT_FLAGS, "-c", RUNTIME / f"{target.stem}.c", "-o", target], check=True)
+        runtime = {folder / f"{source.stem}.o": source for source in own_files("network*.c")}
+        for target, own in runtime.items():
+            subprocess.run([*common, *STRICT_FLAGS, "-c", own, "-o", target], check=True)
         subprocess.run([*common, "-shared", generated, *runtime, "-lm", "-o", library], check=True)
         self.library = ctypes.CDLL(str(library))
         self.sizes = traced.work_sizes

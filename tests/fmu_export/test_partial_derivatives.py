@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from witnesses_ends import Pole
 
 import hybrid_model as hm
-from fmu.trace import trace
-from hybrid_model.variables import Kind, element_names
+from hybrid_model.declare.variables import Kind, element_names
+from hybrid_model.native.trace import trace
 
 FORWARD, REVERSE = "GetDirectionalDerivative", "GetAdjointDerivative"
 MODES = ["initialization", "running"]

@@ -16,14 +16,14 @@ from pathlib import Path
 
 import pytest
 
-import fmu.build
-import fmu.libraries
-from fmu.build import BuildError, compile_fmu, fmi_headers
-from fmu.check.binary import read_binary
-from fmu.compiler import cache_folder, is_zig
-from fmu.macho import export_only, universal
-from fmu.platforms import PLATFORMS, chosen_platforms, library_members, this_platform
-from fmu.variables import Fmi
+import fmu.build.binaries
+import fmu.build.libraries
+from fmu.build.binaries import BuildError, compile_fmu, fmi_headers
+from fmu.build.compiler import cache_folder, is_zig
+from fmu.build.mach_o import export_only, universal
+from fmu.build.platforms import PLATFORMS, chosen_platforms, library_members, this_platform
+from fmu.describe.variables import Fmi
+from fmu.validate.binaries.binary import read_binary
 
 VERSION = """
 #include "fmi3Functions.h"
@@ -231,7 +231,7 @@ class TestAllPlatforms:
         places = [
             str(Path.home()),
             str(archives(fmi)[0].parents[1]),
-            os.path.dirname(fmu.build.__file__),
+            os.path.dirname(fmu.build.binaries.__file__),
             "hybrid-fmu-",
         ]
         for name, library in libraries(archives(fmi)[0]).items():
@@ -268,7 +268,7 @@ def test_hiding_names_keeps_a_library_of_macos_whole(platform, tmp_path, monkeyp
     """The linker's own hashes come out again, so the signature is understood; what is hidden is gone, nothing else."""
     (tmp_path / "model.c").write_text(VERSION)
     with monkeypatch.context() as patch:
-        patch.setattr(fmu.libraries, "export_only", lambda library, prefix: library)
+        patch.setattr(fmu.build.libraries, "export_only", lambda library, prefix: library)
         raw = compile_fmu([tmp_path / "model.c"], [fmi_headers()], tmp_path / "raw", platform=platform).read_bytes()
     assert export_only(raw, "_") == raw
     hidden = export_only(raw, "_fmi")

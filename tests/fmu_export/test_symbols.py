@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybrid_model as hm
-from fmu.errors import TraceError
-from fmu.symbols import expressions, symbol_vector
-from fmu.trace import trace
+from hybrid_model.errors import TraceError
+from hybrid_model.native.symbols import expressions, symbol_vector
+from hybrid_model.native.trace import trace
 
 FUNCTIONS = {
     "arithmetic": lambda x, y: (x + y) * x - y / (1.0 + x**2) - 2.0 * x,

@@ -8,10 +8,10 @@ from description_cases import BOTH, described, elements, schema
 from lxml import etree
 
 import hybrid_model as hm
-from fmu.network import network_trace
-from fmu.terminals import KIND, terminals, terminals_and_icons
-from fmu.variables import Fmi
+from fmu.describe.terminals import KIND, terminals, terminals_and_icons
+from fmu.describe.variables import Fmi
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.networks.network import network_trace
 
 
 def found(automaton, fmi):

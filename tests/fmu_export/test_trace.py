@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.errors import TraceError
-from fmu.trace import trace
-from hybrid_model.layout import Layout
+from hybrid_model.declare.layout import Layout
+from hybrid_model.errors import TraceError
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.trace import trace
 
 
 def automaton(**maps):

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmu.quantities import display_attributes, quantity
-from fmu.units import BASE_UNITS, base_unit, unit_per_second
+from fmu.describe.quantities import display_attributes, quantity
+from fmu.describe.units import BASE_UNITS, base_unit, unit_per_second
 
 
 def in_base_units(**exponents):

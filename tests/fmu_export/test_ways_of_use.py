@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from witnesses import Cascade, FlowFirst, Hill, Mix, Ramps, Timers, random_automaton
 
 import hybrid_model as hm
+from hybrid_model.declare.variables import Kind, element_names
 from hybrid_model.models import BouncingBall, Thermostat
-from hybrid_model.variables import Kind, element_names
 
 STATE_TOLERANCE = 1e-8  # the project's limit for states
 TIME_TOLERANCE = 1e-7  # and for times of events

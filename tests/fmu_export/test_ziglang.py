@@ -9,8 +9,8 @@ import pytest
 from fmu_driver import Instance, Library, advance
 from witnesses import Mix
 
-from fmu.check.binary import read_binary
 from fmu.export import export_fmu
+from fmu.validate.binaries.binary import read_binary
 
 pytestmark = pytest.mark.long
 

@@ -6,7 +6,7 @@ import pytest
 from catalogue import cases
 
 import hybrid_model as hm
-from fmu.flow_functions import FlowError, FlowFunctions
+from cosim.flow_functions import FlowError, FlowFunctions
 from hybrid_model.linear import linearise
 from hybrid_model.models import BouncingBall
 

@@ -12,8 +12,8 @@ from catalogue import cases
 from test_agreement import python_run, shown, step_values
 
 import hybrid_model as hm
+from hybrid_model.declare.variables import Kind, element_names
 from hybrid_model.models import BouncingBall
-from hybrid_model.variables import Kind, element_names
 
 WAYS = {
     "2.0 ME, CVode": ("2.0", "ModelExchange", {"relative_tolerance": 1e-12}),

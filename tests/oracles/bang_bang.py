@@ -6,7 +6,7 @@ Independent of the package's sums over cells: weights are evaluated, and differe
 import numpy as np
 from scipy.linalg import expm
 
-from hybrid_model.consensus.graphs import disagreement_basis, weighted_laplacian
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, weighted_laplacian
 
 
 def reached(scenario, direction, t_end, span, decay=0.0, steps_per_piece=60):

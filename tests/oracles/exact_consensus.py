@@ -17,8 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid_model.consensus.scenario import NoSwitching, Scenario, TriggerKind
-from hybrid_model.consensus.weights import ConstantWeight, WeightMap
+from hybrid_model.consensus.scenario.scenario_file import NoSwitching, Scenario, TriggerKind
+from hybrid_model.consensus.weights.gated_sine import ConstantWeight, WeightMap
 
 EPS = np.finfo(float).eps
 THRESHOLDS = (TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.MIXED, TriggerKind.SELF_TRIGGERED)

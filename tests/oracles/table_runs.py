@@ -9,10 +9,10 @@ from bisect import bisect_right
 
 import numpy as np
 
-from hybrid_model.consensus.switching import NoSwitching, PeriodicSwitching
-from hybrid_model.consensus.table_weights import PiecewiseWeight, SampledWeight
-from hybrid_model.consensus.wave_weights import SquareWeight
-from hybrid_model.consensus.weights import ConstantWeight
+from hybrid_model.consensus.weights.gated_sine import ConstantWeight
+from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching
+from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
+from hybrid_model.consensus.weights.waves import SquareWeight
 
 
 def table_run(scenario):

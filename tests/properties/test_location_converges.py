@@ -22,8 +22,8 @@ from models import test_thermostat as thermostat
 from models import test_two_tank as tanks
 
 import hybrid_model as hm
-from fmu.compiled import compiled
 from hybrid_model import models
+from hybrid_model.native.compiled import compiled
 
 
 @dataclass(frozen=True)

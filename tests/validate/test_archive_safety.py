@@ -10,10 +10,10 @@ import zlib
 import pytest
 from small_fmus import DESCRIPTIONS
 
-from fmu.check.archive import Archive, ArchiveError, extract_fmu
-from fmu.check.archive_rules import ArchiveLimits
-from fmu.check.findings import Severity
-from fmu.check.fmu_file import check_fmu
+from fmu.archives.archive import Archive, ArchiveError, extract_fmu
+from fmu.archives.rules import ArchiveLimits
+from fmu.validate.findings import Severity
+from fmu.validate.fmu_file import check_fmu
 
 DESCRIPTION = ("modelDescription.xml", DESCRIPTIONS[3].encode())
 

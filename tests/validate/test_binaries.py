@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_fmus import EXTENSION, binary
 
-from fmu.check.binary import BinaryError, read_binary
-from fmu.check.functions import required
+from fmu.validate.binaries.binary import BinaryError, read_binary
+from fmu.validate.functions import required
 
 PLACES = Path(fmpy.__path__[0])
 CONTAINERS = sorted((PLACES / "container_fmu" / "binaries").rglob("container_fmu.*"))

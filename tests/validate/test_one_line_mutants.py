@@ -5,9 +5,9 @@ import zipfile
 
 import pytest
 
-from fmu.check.findings import Severity
-from fmu.check.fmu_file import check_fmu
 from fmu.export import export_fmu
+from fmu.validate.findings import Severity
+from fmu.validate.fmu_file import check_fmu
 from hybrid_model.models import BouncingBall
 
 

@@ -1,0 +1,158 @@
+"""A Co-Simulation FMU in a file: what its description says, and its binary, loaded once for all runs."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import weakref
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from fmpy.model_description import ValidationError
+
+from cosim.errors import CosimError
+from cosim.instances.fmi2 import Fmi2Instance
+from cosim.instances.fmi3 import Fmi3Instance
+from cosim.instances.instance import FmuInstance
+from fmu.archives.archive import Archive
+from fmu.importer.folders import temporary_folder
+from fmu.importer.loading import read_description
+from fmu.importer.unpacking import unpack
+
+_alone: dict[str, str] = {}
+OWN_TOOL = "hybrid-fmu"
+"""What FMUs that this project exports say of their tool."""
+
+
+class FmuFile:
+    """An FMU of FMI 2.0 or 3.0 for Co-Simulation.
+
+    Parameters
+    ----------
+    name : str
+        Of the slave, for messages.
+    path : str or Path
+    validate : bool
+        Whether to hold the description against the schema and fmpy's checks.
+
+    Attributes
+    ----------
+    description : fmpy.model_description.ModelDescription
+    start_time, stop_time, step : float or None
+        What the description proposes for a run, in s.
+
+    Raises
+    ------
+    CosimError
+        If the file is no such FMU, or its archive must not be extracted.
+    """
+
+    def __init__(self, name: str, path: str | Path, *, validate: bool) -> None:
+        try:
+            self.description = read_description(path, validate=validate)
+        except ValidationError as error:
+            raise CosimError(
+                f"{name}: {path} cannot be read as an FMU: {error}\n`hybrid-fmu validate` says more; validate=False "
+                "(--no-validate) goes on all the same."
+            ) from error
+        except Exception as error:
+            raise CosimError(f"{name}: {path} cannot be read as an FMU: {error}") from error
+        kind = _kind(self.description)
+        if kind is None or self.description.coSimulation is None:
+            raise CosimError(
+                f"{name}: {path} is not an FMI 2.0 or 3.0 Co-Simulation FMU (it says FMI "
+                f"{self.description.fmiVersion}, {_interfaces(self.description)}): export it as one."
+            )
+        self._name, self._path, self._kind = name, path, kind
+        self._loaded: FmuInstance | None = None
+        experiment = self.description.defaultExperiment
+        self.start_time, self.stop_time, self.step = (
+            _seconds(getattr(experiment, attribute, None)) for attribute in ("startTime", "stopTime", "stepSize")
+        )
+        if self.step is None:
+            self.step = _seconds(getattr(self.description.coSimulation, "fixedInternalStepSize", None))
+
+    @property
+    def foresees(self) -> bool:
+        """Whether its nextEventTime is the first of all of its events.
+
+        FMI asks of FMUs that they name their time events; the events on the states of others come unannounced.
+        """
+        return str(self.description.generationTool).startswith(OWN_TOOL)
+
+    def claim(self) -> None:
+        """Note that an instance is about to be made.
+
+        Raises
+        ------
+        CosimError
+            If there is one already in this process, and the FMU allows no other.
+        """
+        if not self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
+            return
+        other = _alone.setdefault(self.description.guid, self._name)
+        if other != self._name:
+            raise CosimError(
+                f"{self._name} and {other} are one FMU, of which a process may have one instance at a time "
+                "(canBeInstantiatedOnlyOncePerProcess is true): run them in two processes."
+            )
+
+    def yield_claim(self) -> None:
+        """Note that the instance is gone, or could not be made."""
+        if _alone.get(self.description.guid) == self._name:
+            del _alone[self.description.guid]
+
+    def load(self, hear: Callable[[int, str], None]) -> FmuInstance:
+        """Load the binary, if nobody has, and return its instance to be.
+
+        Parameters
+        ----------
+        hear : callable
+            Told the status and the text of each message; it does not keep this object.
+
+        Raises
+        ------
+        CosimError
+            If there is no binary for this machine, or it cannot be loaded.
+        """
+        if self._loaded is None:
+            folder = temporary_folder()
+            try:
+                with Archive(self._path) as archive:
+                    unpack(archive, folder)
+                self._loaded = self._kind(self.description, folder, self._name, hear)
+            except Exception as error:
+                shutil.rmtree(folder, ignore_errors=True)
+                raise CosimError(f"{self._name}: {self._path} cannot be loaded on this machine: {error}") from error
+            weakref.finalize(self, _unload, self._loaded.fmu, folder)
+        return self._loaded
+
+
+def _kind(description: Any) -> type[FmuInstance] | None:
+    if description.fmiVersion == "2.0":
+        return Fmi2Instance
+    return Fmi3Instance if description.fmiVersion.startswith("3.") else None
+
+
+def _interfaces(description: Any) -> str:
+    offered = {
+        "Co-Simulation": description.coSimulation,
+        "Model Exchange": description.modelExchange,
+        "Scheduled Execution": description.scheduledExecution,
+    }
+    return " and ".join(name for name, interface in offered.items() if interface is not None) or "no interface"
+
+
+def _seconds(text: str | None) -> float | None:
+    """Return a time of the description, if it says a usable one."""
+    try:
+        value = math.nan if text is None else float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _unload(fmu: Any, folder: Path) -> None:
+    fmu.freeLibrary()
+    shutil.rmtree(folder, ignore_errors=True)

@@ -1,0 +1,162 @@
+"""Generate model.c: the traced functions and the tables that the engine reads (hybrid_model/engine/model.h)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from fmu.describe.variables import FmuVariable
+from hybrid_model import scales
+from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.transitions import Priority, Trigger
+from hybrid_model.declare.variables import Kind
+from hybrid_model.native.c_text import array, boolean, constant, functions, row, string
+from hybrid_model.native.derivatives import derivative_functions
+from hybrid_model.native.names import NameTable
+from hybrid_model.native.networks.network import NetworkTrace
+from hybrid_model.native.trace import Trace
+
+
+def model_code(
+    traced: Trace | NetworkTrace, variables: Sequence[FmuVariable], token: str, kinds: Collection[str]
+) -> str:
+    """Return the C source of a model.
+
+    Parameters
+    ----------
+    traced : Trace or NetworkTrace
+        The automaton's maps.
+    variables : sequence of FmuVariable
+        In the order of their value references.
+    token : str
+        Instantiation token.
+    kinds : collection of str
+        ``"cs"``, ``"me"``: what the FMU offers.
+
+    Returns
+    -------
+    str
+        A C99 translation unit that defines ``const Model model``.
+    """
+    maps, work = _maps(traced)
+    tables = [*_tables(traced, variables), _model(traced, variables, token, kinds, work)]
+    return "\n".join([_PRELUDE, maps, *tables])
+
+
+def _maps(traced: Trace | NetworkTrace) -> tuple[str, Sequence[int]]:
+    """Return the definitions of the maps and of their derivatives, and the sizes of the work arrays they need."""
+    if isinstance(traced, NetworkTrace):
+        return traced.c_code(), traced.work_sizes
+    given = [*traced.functions, *derivative_functions(traced).values()]
+    resets = array("ModelFunction", "resets", (reset.name() for reset in traced.resets))
+    code = "\n".join([functions("model", given), '#include "model.h"', "", resets, _RESET])
+    return code, [max(getattr(f, size)() for f in given) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
+
+
+_MAPS = (
+    *("start", "flow", "flow_set", "margins", "times", "outputs", "reset"),
+    *("forward", "reverse", "start_forward", "start_reverse"),
+)
+_SCALES = (
+    *(
+        "roundings",
+        "instant",
+        "instant_in_gap",
+        "border",
+        "absolute",
+        "rounding_level",
+        "unknown",
+        "probe",
+        "overshoot",
+    ),
+    *("accumulation", "crowd", "resolved", "chatter", "pause"),
+)
+"""As `ModelScales` has them; the numbers are those of `hybrid_model.scales`."""
+_PRELUDE = """\
+/* Generated from an automaton.  Its names stay inside, and its maps need not use all that they are given. */
+#include <math.h>
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif
+"""
+_RESET = """\
+static int hybrid_reset(size_t jump, const double **arg, double **res, long long *iw, double *w)
+{
+    return resets[jump](arg, res, iw, w, 0);
+}
+"""
+
+
+def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> list[str]:
+    automaton, layout, names = traced.automaton, traced.layout, NameTable()
+    starts = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
+    margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
+    tables = [
+        *(array("double", f"start_{name}", map(constant, layout.start(kind))) for name, kind in starts),
+        array("double", "nominals", map(constant, _nominals(layout))),
+        array("ModelName", "state_names", map(names.entry, layout.names(Kind.STATE))),
+        array("ModelName", "discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
+        array("ModelName", "margin_names", map(names.entry, margin_names)),
+        array("ModelJump", "jumps", _jumps(traced, names)),
+        array("size_t", "clock_jump", (str(clock.jump) for clock in automaton.clocks)),
+        array("ModelVariable", "variables", (_variable(variable, names) for variable in variables)),
+    ]
+    return [*tables, names.definition("names")]
+
+
+def _nominals(layout: Layout) -> list[float]:
+    """Return a usual size of each continuous state, 0 where none is declared."""
+    variables = [place.variable for place in layout.places[Kind.STATE]]
+    return [0.0 if v.nominal is None else v.nominal for v in variables for _ in range(v.size)]
+
+
+def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
+    rows = []
+    counts = {Trigger.STATE: 0, Trigger.TIME: 0}
+    for info in traced.automaton.jumps:
+        kind = "JUMP_ON_STATE" if info.trigger is Trigger.STATE else "JUMP_ON_TIME"
+        rows.append(row(names.entry(info.name), kind, counts[info.trigger], boolean(info.internal)))
+        counts[info.trigger] += 1
+    return rows
+
+
+def _variable(variable: FmuVariable, names: NameTable) -> str:
+    kind = (variable.type.value, variable.bank.value)
+    flags = map(boolean, (variable.discrete, variable.calculated, variable.tunable))
+    return row(names.entry(variable.name), variable.index, variable.size, *kind, *flags)
+
+
+def _model(
+    traced: Trace | NetworkTrace,
+    variables: Sequence[FmuVariable],
+    token: str,
+    kinds: Collection[str],
+    work: Sequence[int],
+) -> str:
+    automaton, sizes = traced.automaton, traced.layout.sizes
+    fields = {
+        "name": string(automaton.name),
+        "token": string(token),
+        "co_simulation": boolean("cs" in kinds),
+        "model_exchange": boolean("me" in kinds),
+        "n_states": sizes[Kind.STATE],
+        "n_discrete": sizes[Kind.DISCRETE],
+        "n_inputs": sizes[Kind.INPUT],
+        "n_parameters": sizes[Kind.PARAMETER],
+        "n_outputs": sizes[Kind.OUTPUT],
+        "n_margins": sum(info.trigger is Trigger.STATE for info in automaton.jumps),
+        "n_times": sum(info.trigger is Trigger.TIME for info in automaton.jumps),
+        "n_jumps": len(automaton.jumps),
+        "n_clocks": len(automaton.clocks),
+        "n_variables": len(variables),
+        **dict(zip(("n_arg", "n_res", "n_iw", "n_w"), work, strict=True)),
+        "flow_priority": boolean(automaton.priority is Priority.FLOW),
+        "has_flow_set": boolean(automaton.has_flow_set),
+        "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
+        **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
+        **{name: f"hybrid_{name}" for name in _MAPS},
+        "scales": row(*(constant(getattr(scales, name.upper())) for name in _SCALES)),
+        **{name: name for name in ("nominals", "jumps", "clock_jump", "variables")},
+        **{name: name for name in ("state_names", "discrete_names", "margin_names", "names")},
+    }
+    return "const Model model = {\n" + "".join(f"    .{key} = {value},\n" for key, value in fields.items()) + "};\n"

@@ -1,0 +1,218 @@
+"""The sentences beside the numbers of `certify`: failed hypotheses, what remains true, refuted printed numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from hybrid_model.consensus.certificates.analysis import Analysis
+from hybrid_model.consensus.certificates.bounds import Bounds, with_threshold
+from hybrid_model.consensus.certificates.corollary import corollary_rate, corollary_rate_exact
+from hybrid_model.consensus.certificates.hypotheses import PAPER_LAWS, Hypothesis
+from hybrid_model.consensus.certificates.observed import Observation
+from hybrid_model.consensus.certificates.trees import tree_radii
+from hybrid_model.consensus.certificates.verdicts import statement
+from hybrid_model.consensus.excitation.joint import joint_excitation
+from hybrid_model.consensus.runs.report import edge_norm
+from hybrid_model.consensus.scenario.trigger_data import TriggerKind
+from hybrid_model.consensus.weights.switching import NoSwitching
+
+__all__ = ["scenario_notes"]
+
+_NEGLIGIBLE = 0.01
+
+
+def scenario_notes(bounds: Bounds, hypotheses: Sequence[Hypothesis], seen: Observation | None) -> Iterator[str]:
+    """All notes on a scenario whose union of graphs is connected."""
+    for hypothesis in hypotheses:
+        if not hypothesis.holds:
+            yield f"Hypothesis '{hypothesis.name}' fails: {hypothesis.detail} {_remains(hypothesis, bounds)}".strip()
+    yield from _constants(bounds.analysis)
+    yield from _accuracy(bounds)
+    yield from _corollary(bounds.analysis)
+    yield from _radius_notes(bounds)
+    yield from _refuted(bounds, seen)
+    if seen is not None:
+        counts, states = ", ".join(map(str, seen.events_per_agent)), ", ".join(f"{x:.12f}" for x in seen.x_end)
+        total = sum(seen.events_per_agent)
+        yield f"The run up to {seen.end:.6g} s has {total} events, per agent {counts}, and ends in x = ({states})."
+    if seen is not None and seen.radius is not None and seen.initial_share is not None:
+        largest = max(bounds.exact_radius or 0.0, seen.radius)
+        if bounds.analysis.is_periodic and seen.initial_share > _NEGLIGIBLE * largest:
+            yield (
+                f"The run ends early: the share of the initial state in ||x_e|| is still up to "
+                f"{seen.initial_share:.6g} in its last cycle; the observed radius leaves that share out."
+            )
+
+
+def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
+    """What is still true when a hypothesis fails."""
+    analysis, name = bounds.analysis, hypothesis.name
+    end = analysis.scenario.stop_time
+    if name == "trigger of the paper" and analysis.scenario.trigger.kind is TriggerKind.CONTINUOUS:
+        return "It has no events, so there is no gap to bound."
+    if name == "exciting tree":
+        return "The tree-free, energy and exact forms need no tree."
+    scenario = analysis.scenario
+    if name.startswith("beta below") and not (scenario.channel.ideal and scenario.trigger.kind in PAPER_LAWS):
+        # What follows is about a threshold c exp(-beta t) on broadcasts that arrive at once.
+        return ""
+    if name == "beta below the printed rate":
+        return "The printed bound does not exist; the exact form needs no beta below alpha_v."
+    if name == "beta below the valid rate":
+        bound = bounds.valid
+        if bound.kappa1 is None or bound.kappa2 is None:
+            return ""
+        factor, kappa1, kappa2 = bound.edge_factor, bound.edge_factor * bound.kappa1, bound.edge_factor * bound.kappa2
+        if bound.decay == bound.rate:
+            shape = f"({factor * bound.transient:.6g} + {kappa2:.6g} (1 + t/{bound.window:.6g}))"
+        else:
+            shape = f"{kappa1:.6g}"
+        return f"No valid factor of exp(-beta t) exists; still ||x_e(t)|| <= {shape} exp(-{bound.rate:.6g} t)."
+    if name == "beta below the Floquet rate":
+        gap = bounds.gap_until(end)
+        still = "" if gap is None else f"; no two broadcasts of an agent up to {end:.6g} s are closer than {gap:.6g} s"
+        return (
+            "The threshold falls faster than disagreement can, so gaps shrink without a uniform bound. Consensus is "
+            f"still reached, at the Floquet rate, and no Zeno behaviour occurs{still}."
+        )
+    if name == "periodic weights":
+        return "There is no Floquet rate; the exact radius is that of the run up to the stop time."
+    if name == "beta below the improved rate" and analysis.is_periodic:
+        return "The improved radius does not exist; the energy bound and the exact form go by the Floquet rate."
+    if name == "beta below the improved rate":
+        return "The energy bound does not exist; the exact radius and the gap hold for the run up to the stop time."
+    if name == "bounded errors":
+        timed = scenario.trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC)
+        also = " and the period, as a gap," if timed else ""
+        return f"Only the rate of the network without errors{also} {'are' if timed else 'is'} certified."
+    return ""
+
+
+def _constants(analysis: Analysis) -> Iterator[str]:
+    window = analysis.window
+    tree, m, n = analysis.tree_weights, analysis.tree_coordinates, analysis.disagreement
+    yield (
+        f"Excitation over every window of T = {window:.6g} s, tree {list(analysis.tree.tree)}: "
+        f"W_tau mu1 = {tree.mu1:.7g}, mu2 = {tree.mu2:.7g}; M mu1 = {m.mu1:.7g}, mu2 = {m.mu2:.7g}, "
+        f"sup int ||M|| = {m.mu2_bar:.7g}; N mu1 = {n.mu1:.7g}, mu2 = {n.mu2:.7g}, sup int ||N|| = {n.mu2_bar:.7g}, "
+        f"||int N||_F = {n.frobenius:.7g}."
+    )
+    scenario = analysis.scenario
+    error = 2 * scenario.trigger.threshold * math.sqrt(scenario.network.agents - 1)
+    yield (
+        f"With this tree rho = {analysis.tree.rho:.7g} and C = 2 c sqrt(p) = {error:.7g}; "
+        f"||x_e(0)|| = {edge_norm(scenario, np.asarray(scenario.network.initial)):.7g}."
+    )
+    if analysis.spectrum is not None and not analysis.spectrum.is_scaled:
+        multipliers = ", ".join(f"{abs(value):.6g}" for value in analysis.spectrum.multipliers)
+        yield f"Moduli of the Floquet multipliers over {analysis.spectrum.period:.6g} s: {multipliers}."
+
+
+def _accuracy(bounds: Bounds) -> Iterator[str]:
+    """How near the exact numbers are to what they stand for."""
+    analysis = bounds.analysis
+    if analysis.spectrum is not None and analysis.spectrum.is_scaled:
+        yield (
+            f"Over the long cycle of {analysis.spectrum.period:.6g} s all Floquet multipliers are below 1e-5; the "
+            "rate is that of a product which is scaled on the way."
+        )
+    rate, worst = bounds.floquet_rate, bounds.exact_worst
+    if rate is not None and bounds.slowest and bounds.slowest[0][1] < rate:
+        near = (
+            f"beta = {bounds.slowest[0][1]:.6g}/s is close to the Floquet rate {rate:.6g}/s, measured by the cycle of"
+        )
+        if bounds.is_beyond_reach(bounds.slowest[0][1]):
+            yield (
+                f"The exact radius and the improved gap are not computed: {near} {analysis.cycle:.6g} s, so errors of "
+                "too many earlier cycles count."
+            )
+        if bounds.energy_radius is None:
+            yield (
+                f"The energy bound does not exist: {near} {analysis.cycle:.6g} s, and over no number of cycles that "
+                "was tried does disagreement fall faster than the threshold."
+            )
+    if worst is None or not bounds.slowest:
+        return
+    fewer = ""
+    if worst.resolution > analysis.resolution * (1 + 1e-12):
+        fewer = f", in place of {analysis.resolution:.6g}: the cycle of {analysis.cycle:.6g} s would take too many"
+    yield (
+        f"The exact radius is reached from below: on cells of k ||int N|| <= {worst.resolution:.6g}{fewer}. It lacks a "
+        f"share of the order of {worst.resolution**2:.1g}; the improved gap allows for {worst.cover - 1:.1g}."
+    )
+
+
+def _corollary(analysis: Analysis) -> Iterator[str]:
+    """The repaired corollary on switching topologies."""
+    if isinstance(analysis.scenario.switching, NoSwitching) or analysis.is_constant:
+        return
+    joint, gain = joint_excitation(analysis.scenario), analysis.scenario.network.gain
+    yield (
+        f"Corollary 1, repaired: {len(joint.intervals)} jointly connected intervals of at most {joint.longest:.6g} s, "
+        f"least weight on a spanning tree of each w_min = {joint.weakest.weight:.6g}, window {joint.window:.6g} s: "
+        f"mu1 of N is at least {joint.mu1_of_paths:.6g} (exactly {joint.exact.mu1:.6g}), the rate at least "
+        f"{corollary_rate(joint, gain):.6g}/s (with the exact constants {corollary_rate_exact(joint, gain):.6g}/s)."
+    )
+
+
+def _radius_notes(bounds: Bounds) -> Iterator[str]:
+    scenario = bounds.analysis.scenario
+    found = tree_radii(bounds.analysis) if bounds.parts and scenario.trigger.threshold > 0 else []
+    if len(found) > 1:
+        least, most = min(found, key=lambda t: t.kappa2), max(found, key=lambda t: t.kappa2)
+        best = min(found, key=lambda t: t.radius)
+        yield (
+            f"Over the {len(found)} exciting spanning trees, with beta = 0: kappa_2^m = {least.kappa2:.6g} (tree "
+            f"{list(least.tree)}), kappa_2^M = {most.kappa2:.6g} (tree {list(most.tree)}); every tree bounds the same "
+            f"x_e, so the least rho kappa_2 = {best.radius:.6g} (tree {list(best.tree)}) is a bound."
+        )
+    if bounds.parts and all(decay > 0 for _, decay in bounds.parts):
+        held = with_threshold(scenario, scenario.trigger.threshold, 0.0)
+        constant = Bounds(bounds.analysis.alike(held))
+        numbers = {
+            "printed": constant.printed_radius,
+            "valid": constant.valid_radius,
+            "energy": constant.energy_radius,
+            "exact": constant.exact_radius,
+        }
+        listing = ", ".join(f"{form} {value:.6g}" for form, value in numbers.items() if value is not None)
+        yield (
+            "The threshold decays, so x_e goes to 0 and the radii are factors of exp(-beta t). "
+            f"With the threshold held at c = {scenario.trigger.threshold:.6g} (beta = 0) the radii are: {listing}."
+        )
+
+
+def _refuted(bounds: Bounds, seen: Observation | None) -> Iterator[str]:
+    """Printed numbers that this very scenario contradicts, and those whose proof or statement fails in general."""
+    printed, valid = bounds.printed, bounds.valid
+    if printed.rate > valid.rate * (1 + 1e-9) > 0:
+        yield (
+            f"The printed rate {printed.rate:.6g}/s uses mu2 of W_tau where the proof needs mu2 of M; with that it is "
+            f"{valid.rate:.6g}/s ({statement('b').remark})."
+        )
+    if bounds.floquet_rate is not None and printed.rate > bounds.floquet_rate * (1 + 1e-9):
+        yield f"The printed rate {printed.rate:.6g}/s is false here: the Floquet rate is {bounds.floquet_rate:.6g}/s."
+    scenario = bounds.analysis.scenario
+    if scenario.trigger.kind not in PAPER_LAWS or not scenario.channel.ideal:
+        return
+    gap = bounds.printed_gap
+    if gap is not None and printed.kappa1 is not None and printed.kappa1 < 0:
+        trigger = bounds.analysis.scenario.trigger
+        limit = trigger.threshold / (bounds.printed_speed * (printed.kappa2 or 1.0))
+        yield (
+            f"The printed minimum gap {gap:.6g} s is not one: kappa_1 = {printed.kappa1:.6g} is negative, so its "
+            f"formula is not the least value of its own inequality, which tends to {limit:.6g} s; "
+            "hybrid_model.consensus.certificates.counterexamples.minimum_gap() shows a run that violates the formula "
+            f"({statement('e3').remark})."
+        )
+        if seen is not None and seen.min_gap is not None and gap > seen.min_gap:
+            yield f"This run violates the printed minimum gap: two broadcasts are {seen.min_gap:.6g} s apart."
+    exact = bounds.exact_radius
+    if bounds.printed_radius is not None and exact is not None and bounds.printed_radius < exact * (1 - 1e-6):
+        yield (
+            f"The printed radius {bounds.printed_radius:.6g} does not hold for all errors within the threshold, some "
+            f"reach {exact:.6g}; whether those of a run do is another question."
+        )

@@ -1,0 +1,141 @@
+"""The energy bound on disagreement, and how large the share of the initial state gets (audit, section 5.3)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid_model.consensus.certificates.analysis import Analysis
+from hybrid_model.consensus.excitation.constants import Signal, scenario_excitation, signal_factor
+from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
+
+__all__ = ["energy_radius", "improved_contraction", "initial_peaks"]
+
+_DOUBLINGS = 10
+_LARGEST = 600.0
+"""Exponent ``beta T`` that a float still holds."""
+
+_FORGOTTEN = 1e-9
+_MOST_CYCLES = 5000
+
+
+def improved_contraction(analysis: Analysis) -> float:
+    """``gamma* = 2 mu1/(1 + mu2 + ||P||_F^2/2)`` of ``k N``: the share of ``||xi||^2`` lost every window.
+
+    Source: audit, section 3 (ii). 0.0 if the excitation is not persistent.
+    """
+    constants, gain = analysis.disagreement, analysis.scenario.network.gain
+    if constants.mu1 <= 1e-12 * constants.mu2:
+        return 0.0
+    return 2 * gain * constants.mu1 / (1 + gain * constants.mu2 + (gain * constants.frobenius) ** 2 / 2)
+
+
+def energy_radius(analysis: Analysis, decay: float) -> float | None:
+    """Bound on ``limsup exp(beta t) ||x_e(t)||`` for the threshold ``exp(-beta t)``; None if it does not exist.
+
+    ``edge_gain c_n sqrt(k nubar/2) e^{beta T} sqrt(1 - q)/(1 - e^{beta T} sqrt q)`` with the exact contraction q over
+    T, or ``q = 1 - gamma*`` if the weights have no period. T is the cycle or a multiple that serves better: the exact q
+    over many cycles falls at the Floquet rate, however slowly it begins.
+
+    With beta > 0 a long window costs ``e^{beta T}``. There the windows are bounded one by one instead: the j-th one
+    back lets through ``e^{beta (j + 1) T} sqrt(k nubar/2) sup ||phi(t, t - j T)||``, because ``a_j - a_{j+1} <= a_j``.
+    The norms for j that are no power of two are bounded by products, so the sum over j < 2^b is ``prod (1 + x_i)`` over
+    i < b with ``x_i = e^{beta T 2^i} sup ||phi(t, t - 2^i T)||``, and the rest is geometric with the ratio x_b.
+
+    Parameters
+    ----------
+    analysis : Analysis
+        The scenario.
+    decay : float
+        beta [1/s].
+    """
+    window, nubar, contraction = _cycle_constants(analysis)
+    strength, series, best = analysis.scenario.network.gain * nubar / 2, 1.0, math.inf
+    first = contraction(1)
+    for doubling in range(_DOUBLINGS):
+        count = 2**doubling
+        growth = decay * window * count
+        least = math.log(strength * count * (1 - first**2)) / 2 + growth if first < 1 and strength > 0 else -math.inf
+        if growth > _LARGEST or (least >= math.log(best) and series >= best):
+            break
+        root = contraction(count)
+        share = math.exp(growth + math.log(root)) if root > 0 else 0.0
+        if share < 1:
+            # 1 - q from its logarithm: q is close to 1 for short windows.
+            lost = -math.expm1(2 * math.log(root)) if root > 0 else 1.0
+            whole = math.sqrt(strength * count * lost) * math.exp(growth) / (1 - share)
+            # Every window for itself: each of the first `count` by the roots of the powers of two that make it up.
+            single = math.sqrt(strength) * math.exp(decay * window) * series / (1 - share)
+            best = min(best, whole, single)
+        series *= 1 + share
+    return analysis.edge_gain * analysis.box_gain * best if math.isfinite(best) else None
+
+
+def _cycle_constants(analysis: Analysis) -> tuple[float, float, Callable[[int], float]]:
+    """T, ``sup int ||N||`` over T, and the square root of q over multiples of T."""
+    if not analysis.is_periodic:
+        window, root = analysis.window, math.sqrt(1 - improved_contraction(analysis))
+        return window, analysis.disagreement.mu2_bar, lambda count: root**count
+    if analysis.is_constant and analysis.spectrum is not None:
+        window, rate = analysis.window, analysis.spectrum.rate
+        return window, analysis.disagreement.mu2_bar, lambda count: math.exp(-rate * window * count)
+    if analysis.window == analysis.cycle:
+        return analysis.cycle, analysis.disagreement.mu2_bar, analysis.contraction
+    over_cycle = scenario_excitation(analysis.scenario, Signal.DISAGREEMENT, window=analysis.cycle)
+    return analysis.cycle, over_cycle.mu2_bar, analysis.contraction
+
+
+def initial_peaks(analysis: Analysis, decay: float) -> tuple[float, NDArray[np.float64]]:
+    """Suprema over t >= 0 of ``exp(beta t) ||x_e(t)||`` and ``exp(beta t) |x_i - x_j|`` without trigger errors.
+
+    Returns
+    -------
+    norm : float
+        Over the underlying graph.
+    pairs : ndarray, shape (m,)
+        For each listed edge.
+
+    Notes
+    -----
+    The suprema are over the ends of short cells, and what may lie between is added. Over a cell with
+    ``k int ||N|| <= d`` the state leaves one of its end values by at most ``d/2 ||xi||``; if all weights have one
+    shape, it leaves the straight line between them by at most ``d^2/8 ||xi||``.
+    """
+    network, cells = analysis.scenario.network, analysis.cells
+    basis = disagreement_basis(network.agents)
+    edges = basis.T @ np.hstack([incidence(network.agents, e) for e in (network.edges, network.underlying_edges)])
+    listed = len(network.edges)
+    lengths = np.where(cells.is_idle, 0.0, np.diff(cells.times))
+    aside = _between_ends(analysis)
+    longer = math.exp(decay * float(np.max(lengths)))
+    path, state = np.empty((len(cells.flows) + 1, basis.shape[1])), analysis.initial_disagreement
+    pairs, norm, start, least = np.zeros(listed), 0.0, 0.0, _FORGOTTEN * float(np.linalg.norm(state))
+    for _ in range(_MOST_CYCLES):
+        path[0] = state
+        for j, flow in enumerate(cells.flows):
+            path[j + 1] = flow @ path[j]
+        growth = np.exp(decay * (start + cells.times))
+        # A cell adds to both its ends what it may hold above them.
+        inside = (longer * (1 + aside) - 1) * np.linalg.norm(path[:-1], axis=1) * growth[:-1]
+        sizes = np.maximum(np.append(inside, 0.0), np.append(0.0, inside))
+        values = np.abs(path @ edges) * growth[:, None]
+        pairs = np.maximum(pairs, np.max(values[:, :listed] + math.sqrt(2.0) * sizes[:, None], axis=0))
+        norms = np.linalg.norm(values[:, listed:], axis=1)
+        norm = max(norm, float(np.max(norms + analysis.edge_gain * sizes)))
+        state, start = path[-1], start + float(cells.times[-1])
+        rest = float(np.linalg.norm(state)) * math.exp(decay * (start + float(cells.times[-1])))
+        if rest <= least or not analysis.is_periodic:
+            break
+    return max(norm, analysis.edge_gain * rest), np.maximum(pairs, math.sqrt(2.0) * rest)
+
+
+def _between_ends(analysis: Analysis) -> NDArray[np.float64]:
+    """How far the state leaves its values at the ends of each cell, per ``||xi||`` at its beginning."""
+    factor, cells = signal_factor(analysis.scenario, Signal.DISAGREEMENT), analysis.cells
+    matrices = (factor * cells.doses[:, None, :]) @ factor.T
+    doses = analysis.scenario.network.gain * np.linalg.eigvalsh(matrices)[:, -1]
+    alike = len(set(analysis.scenario.edge_weights.carriers)) == 1
+    return np.asarray(np.minimum(doses**2 / 8 if alike else doses / 2, 1.0))

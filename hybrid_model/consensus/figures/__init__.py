@@ -1,0 +1,4 @@
+"""Figures of runs and certificates, as files.
+
+It imports all other rooms of `consensus`.
+"""

@@ -1,0 +1,241 @@
+"""Figures of one run in more detail: every agent's error, broadcasts over the weights, gaps against their bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
+
+from hybrid_model.consensus.figures.run import COLUMN, MARKER, plot_broadcasts, plot_error_against_threshold
+from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of
+from hybrid_model.consensus.runs.metrics import States, disagreement, gap_statistics
+from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.plots import COLORS, new_axes, plot_inter_event_times
+from hybrid_model.record.arc import HybridArc
+
+__all__ = [
+    "plot_all_errors",
+    "plot_broadcasts_and_weights",
+    "plot_disagreement",
+    "plot_gap_histogram",
+    "plot_gaps_against_bounds",
+]
+
+DASHES = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), "solid", (0, (3, 1, 1, 1, 1, 1)))
+"""Line styles of bounds, so that they can be told apart without colour as well."""
+SHADE = "#d9d9d9"
+
+
+def plot_all_errors(scenario: Scenario, arc: HybridArc, columns: int = 2) -> Figure:
+    """Draw the error of every agent against the threshold, one pair of axes an agent, all with the same limits.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran; its trigger has a threshold that is a function of time.
+    arc : HybridArc
+        Its run.
+    columns : int
+        Of the grid.
+
+    Returns
+    -------
+    Figure
+    """
+    n = scenario.network.agents
+    rows = math.ceil(n / columns)
+    figure, grid = plt.subplots(
+        rows,
+        columns,
+        figsize=(COLUMN[0] * columns, 0.3 + 1.5 * rows),
+        sharex=True,
+        sharey=True,
+        squeeze=False,
+        layout="constrained",
+    )
+    for agent in range(1, n + 1):
+        ax = grid.flat[agent - 1]
+        plot_error_against_threshold(scenario, arc, agent, ax)
+        ax.set_title(f"agent {agent}", loc="left", fontsize="medium")
+        ax.set_ylabel(r"$|\hat{x}_i - x_i|$" if (agent - 1) % columns == 0 else "")
+        ax.get_legend().remove()
+        if agent + columns <= n:
+            ax.set_xlabel("")
+        else:
+            ax.tick_params(labelbottom=True)
+    for ax in grid.flat[n:]:
+        ax.remove()
+    threshold = next(line for line in grid.flat[0].lines if str(line.get_label()).startswith("threshold"))
+    broadcast = Line2D([], [], color="0.3", label="broadcast", **MARKER)
+    figure.legend(handles=[threshold, broadcast], loc="outside upper right", ncols=2)
+    return figure
+
+
+def plot_broadcasts_and_weights(
+    scenario: Scenario, event_times: Sequence[npt.ArrayLike], ax: Axes | None = None
+) -> Axes:
+    """Draw who broadcasts when, over the times in which some edge of the agent carries weight, shaded.
+
+    Outside the shade the agent's state stands still: with a constant threshold no broadcast can fall there.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran.
+    event_times : sequence of array_like
+        Times [s] of each agent's broadcasts.
+    ax : Axes, optional
+        Where to draw.
+
+    Raises
+    ------
+    ValueError
+        If there is not one row of times for each agent.
+    """
+    ax = plot_broadcasts(scenario, event_times, ax)
+    pieces = scenario.edge_weights.pieces(0.0, scenario.stop_time)
+    for agent in range(1, scenario.network.agents + 1):
+        edges = edges_of(scenario, agent)
+        spans = [(p.start, p.end - p.start) for p in pieces if np.any(p.amplitudes[edges] > 0)]
+        ax.broken_barh(spans, (agent - 1.45, 0.9), facecolor=SHADE, edgecolor="none", zorder=0)
+    ax.legend(
+        handles=[Patch(facecolor=SHADE, label="some edge of the agent carries weight")],
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.3,
+        handlelength=1.2,
+    )
+    return ax
+
+
+def plot_gaps_against_bounds(
+    scenario: Scenario,
+    event_times: Sequence[npt.ArrayLike],
+    bounds: Mapping[str, float | None],
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the time since the agent's last broadcast at every broadcast, and the bounds that it should not fall below.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran.
+    event_times : sequence of array_like
+        Times [s] of each agent's broadcasts.
+    bounds : mapping
+        Name -> lower bound [s]; those that are None are named in the legend as missing. One that observed gaps fall
+        below is called violated.
+    ax : Axes, optional
+        Where to draw.
+    """
+    ax = new_axes(ax)
+    rows = {agent_name(i): np.asarray(times, dtype=float) for i, times in enumerate(event_times, start=1)}
+    plot_inter_event_times(rows, ax=ax, markersize=3)
+    for line, k in zip(list(ax.lines), range(len(rows)), strict=False):
+        line.set_label(f"agent {k + 1}")
+        line.set_color(COLORS[k % len(COLORS)])
+        line.set_clip_on(False)
+    smallest = gap_statistics(event_times).min
+    lowest = smallest if smallest is not None else 1.0
+    for (name, bound), style in zip(bounds.items(), _cycled(len(bounds)), strict=True):
+        if bound is None or not 0 < bound < math.inf:
+            ax.plot([], [], linestyle="none", label=f"no {name} bound")
+            continue
+        violated = smallest is not None and smallest < bound
+        label = f"{name} bound" + (", violated" if violated else "")
+        ax.axhline(bound, color="#d55e00" if violated else "0.25", linestyle=style, linewidth=0.9, label=label)
+        lowest = min(lowest, bound)
+    top = ax.get_ylim()[1]
+    ax.set_ylim(lowest / 2, max([top, *(2 * b for b in bounds.values() if b is not None and b < math.inf)]))
+    ax.set_xlim(0.0, scenario.stop_time)
+    ax.spines["left"].set_position(("outward", 4.0))
+    ax.set_xlabel("time $t$ (s)")
+    _side_legend(ax)
+    return ax
+
+
+def plot_gap_histogram(
+    event_times: Sequence[npt.ArrayLike], bins: int = 20, ax: Axes | None = None, **options: Any
+) -> Axes:
+    """Draw how often which time between broadcasts occurs, in classes a constant factor apart.
+
+    Parameters
+    ----------
+    event_times : sequence of array_like
+        Times [s] of each agent's broadcasts.
+    bins : int
+        Number of classes.
+    ax : Axes, optional
+        Where to draw.
+    **options
+        As in ``Axes.stairs``.
+
+    Raises
+    ------
+    ValueError
+        If there are no gaps.
+    """
+    ax = new_axes(ax)
+    found = gap_statistics(event_times)
+    counts, limits = found.histogram(bins)
+    look: dict[str, Any] = {"fill": True, "color": COLORS[0], "alpha": 0.6} | options
+    ax.stairs(counts, limits, **look)
+    ax.set_xscale("log")
+    median = found.quantiles((0.5,))[0.5]
+    ax.axvline(median, color="k", linestyle=DASHES[0], linewidth=0.9, label=f"median {median:.3g} s")
+    ax.set_xlabel("time between broadcasts of an agent (s)")
+    ax.set_ylabel("number")
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.3)
+    return ax
+
+
+def plot_disagreement(
+    scenario: Scenario, runs: Mapping[str, States], level: float | None = None, ax: Axes | None = None
+) -> Axes:
+    """Draw ``||x - mean(x) 1||`` of several runs of one network over time, on a logarithmic axis.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran: its stop time counts.
+    runs : mapping
+        Name -> states, from `hybrid_model.consensus.runs.metrics.run_states` or `PeriodicRun.at`.
+    level : float, optional
+        Of the settling time, drawn as a line.
+    ax : Axes, optional
+        Where to draw.
+    """
+    ax = new_axes(ax)
+    times = np.linspace(0.0, scenario.stop_time, 1001)
+    for (name, states), style in zip(runs.items(), ["solid", *_cycled(len(runs))], strict=False):
+        values = disagreement(states(times))
+        ax.plot(times, np.where(values > 0, values, math.nan), linestyle=style, label=name)
+    if level is not None:
+        ax.axhline(level, color="0.5", linewidth=0.7, zorder=0, label="settled")
+    ax.set_yscale("log")
+    ax.set_xlim(0.0, scenario.stop_time)
+    ax.set_xlabel("time $t$ (s)")
+    ax.set_ylabel(r"disagreement $\|x - \bar{x}\mathbf{1}\|$")
+    handles = len(ax.get_legend_handles_labels()[0])
+    ax.legend(
+        loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.3, ncols=2 if handles > 2 else 1, handlelength=1.8
+    )
+    return ax
+
+
+def _cycled(count: int) -> list[Any]:
+    return [DASHES[k % len(DASHES)] for k in range(count)]
+
+
+def _side_legend(ax: Axes) -> None:
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, handlelength=1.8)

@@ -1,0 +1,71 @@
+"""The agent: its motion on broadcast values, an event generator that decides when to broadcast, and what it hears."""
+
+from __future__ import annotations
+
+import hybrid_model as hm
+from hybrid_model.consensus.laws.channels import Receiver
+from hybrid_model.consensus.laws.integrator import Integrator
+from hybrid_model.consensus.laws.triggers import DynamicTrigger, EventGenerator, MixedTrigger, StaticTrigger
+from hybrid_model.declare.variables import Kind
+
+__all__ = ["DynamicTrigger", "EventGenerator", "Integrator", "MixedTrigger", "StaticTrigger", "agent"]
+
+SHOWN = ("broadcast", "events", "threshold", "decay", "broadcast_clock")
+"""What an agent shows of its event generator under its own name, where the law has it."""
+
+
+def agent(
+    name: str,
+    integrator: hm.HybridAutomaton,
+    weights: hm.Automaton,
+    trigger: hm.HybridAutomaton,
+    switching: hm.Automaton | None = None,
+    channel: hm.HybridAutomaton | None = None,
+) -> hm.Composition:
+    """Compose an agent: its inputs are the neighbours' broadcast values, its outputs x and its own broadcast value.
+
+    Parameters
+    ----------
+    name : str
+        Name of the agent.
+    integrator : HybridAutomaton
+        The agent's motion: an `Integrator`, or one with the same inputs and the output ``x``.
+    weights : Automaton
+        With an output ``weights``, one element a neighbour.
+    trigger : HybridAutomaton
+        When the agent broadcasts; it is given the neighbours' values and the weights if it has inputs of these names.
+    switching : Automaton, optional
+        With an input ``raw`` and an output ``weights``: which edges are active.
+    channel : HybridAutomaton, optional
+        With an input ``neighbours`` and an output ``received``: what becomes of the neighbours' broadcasts on their
+        way. If it has an input ``sent``, that is an input of the agent: the neighbours' numbers of broadcasts.
+    """
+    parts: dict[str, hm.Automaton] = {"weights": weights}
+    connections = {"integrator.broadcast": "trigger.broadcast", "trigger.x": "integrator.x"}
+    source = "weights.weights"
+    if switching is not None:
+        parts["switching"] = switching
+        connections["switching.raw"] = source
+        source = "switching.weights"
+    connections["integrator.weights"] = source
+    wanted = {variable.name for variable in trigger.of_kind(Kind.INPUT)}
+    if "weights" in wanted:
+        connections["trigger.weights"] = source
+    names = {"integrator.x": "x", "integrator.gain": "gain"}
+    if channel is None and "neighbours" in wanted:
+        channel = Receiver(degree=_degree(integrator))
+    if channel is None:
+        names["integrator.neighbours"] = "neighbours"
+    else:
+        parts["channel"] = channel
+        connections["integrator.neighbours"] = "channel.received"
+        names |= {f"channel.{item.name}": item.name for item in channel.of_kind(Kind.INPUT)}
+        if "neighbours" in wanted:
+            connections["trigger.neighbours"] = "channel.received"
+    shown = {variable.name for variable in trigger.variables} | {clock.name for clock in trigger.clocks}
+    names |= {f"trigger.{item}": item for item in SHOWN if item in shown}
+    return hm.Composition(name, {**parts, "integrator": integrator, "trigger": trigger}, connections, names)
+
+
+def _degree(integrator: hm.HybridAutomaton) -> int:
+    return next(variable.shape[0] for variable in integrator.variables if variable.name == "neighbours")

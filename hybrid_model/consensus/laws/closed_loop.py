@@ -1,0 +1,112 @@
+"""From a scenario to automata: the agents, their wiring, and the closed loop composed of them."""
+
+from __future__ import annotations
+
+import hybrid_model as hm
+from hybrid_model.consensus.laws.agents import agent
+from hybrid_model.consensus.laws.channels import LossyChannel, link_seeds
+from hybrid_model.consensus.laws.continuous import ContinuousIntegrator
+from hybrid_model.consensus.laws.integrator import Integrator
+from hybrid_model.consensus.laws.trigger_blocks import Surroundings, trigger_block
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.scenario_data import Scenario, TriggerKind
+from hybrid_model.consensus.weights.blocks import switching_block, weights_block
+
+
+def agent_name(number: int) -> str:
+    """Return the name of agent `number`, counted from 1."""
+    return f"agent{number}"
+
+
+def scenario_agents(scenario: Scenario) -> dict[str, hm.Composition]:
+    """Make the agents of a scenario.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Network, weights, switching and trigger.
+
+    Returns
+    -------
+    dict
+        Agent name -> automaton with inputs ``neighbours`` (in the order of the agent's edges) and outputs ``x``,
+        ``broadcast`` and ``events``.
+
+    Raises
+    ------
+    ScenarioError
+        If the trigger cannot be had with the scenario's weights or channel.
+    """
+    return {agent_name(i): _agent(scenario, i) for i in range(1, scenario.network.agents + 1)}
+
+
+def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
+    """Return which broadcasts each agent receives, as ``"agent1.neighbours"`` -> ``["agent2.broadcast", ...]``.
+
+    Over a channel that delays or loses broadcasts, agents also receive the senders' counts, as ``"agent1.sent"``.
+    """
+    wires = {}
+    for i in range(1, scenario.network.agents + 1):
+        others = [other_end(scenario, edge, i) for edge in edges_of(scenario, i)]
+        wires[f"{agent_name(i)}.neighbours"] = [f"{agent_name(j)}.broadcast" for j in others]
+        if others and not scenario.channel.ideal:
+            wires[f"{agent_name(i)}.sent"] = [f"{agent_name(j)}.events" for j in others]
+    return wires
+
+
+def closed_loop(scenario: Scenario) -> hm.Composition:
+    """Compose the agents of a scenario to one automaton.
+
+    Raises
+    ------
+    ScenarioError
+        If `scenario` is no scenario, such as the name of one.
+    """
+    if not isinstance(scenario, Scenario):
+        raise ScenarioError(f"closed_loop was given {scenario!r}: write closed_loop(load_scenario(name or path)).")
+    return hm.Composition(scenario.name, scenario_agents(scenario), broadcast_wires(scenario))
+
+
+def edges_of(scenario: Scenario, number: int) -> list[int]:
+    """Return the edges of agent `number`, as indices from 0 into the network's list."""
+    return [k for k, edge in enumerate(scenario.network.edges) if number in edge]
+
+
+def other_end(scenario: Scenario, edge: int, number: int) -> int:
+    """Return the agent at the other end of an edge of agent `number`."""
+    first, second = scenario.network.edges[edge]
+    return second if first == number else first
+
+
+def _agent(scenario: Scenario, number: int) -> hm.Composition:
+    edges = edges_of(scenario, number)
+    initial = scenario.network.initial[number - 1]
+    motion = ContinuousIntegrator if scenario.trigger.kind is TriggerKind.CONTINUOUS else Integrator
+    return agent(
+        agent_name(number),
+        motion(degree=len(edges), x=initial, gain=scenario.network.gain),
+        weights_block([scenario.weights.waveforms[k] for k in edges]),
+        _trigger(scenario, edges),
+        switching_block(scenario.switching, edges),
+        _channel(scenario, number, edges),
+    )
+
+
+def _trigger(scenario: Scenario, edges: list[int]) -> hm.HybridAutomaton:
+    waveforms = [scenario.weights.waveforms[k] for k in edges]
+    around = Surroundings(edges, waveforms, scenario.switching, scenario.network.gain)
+    return trigger_block(scenario.trigger, around)
+
+
+def _channel(scenario: Scenario, number: int, edges: list[int]) -> hm.HybridAutomaton | None:
+    channel = scenario.channel
+    if channel.ideal or not edges:
+        return None
+    senders = [other_end(scenario, edge, number) for edge in edges]
+    return LossyChannel(
+        degree=len(edges),
+        slots=channel.slots,
+        delay=channel.delay,
+        loss=channel.loss,
+        random=link_seeds(channel.seed, number, senders),
+    )

@@ -1,0 +1,291 @@
+"""What a run costs and what it gives: broadcasts, messages, gaps between events, disagreement, settling."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+
+from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of
+from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.record.arc import HybridArc
+
+__all__ = [
+    "Communication",
+    "GapStatistics",
+    "Performance",
+    "States",
+    "communication",
+    "disagreement",
+    "gap_statistics",
+    "performance",
+    "run_metrics",
+    "run_states",
+    "settling_time",
+]
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_POINTS_PER_PIECE = 16
+_LATE = 0.75
+"""Share of the run after which disagreement counts as ultimate."""
+
+States = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""States of all agents, shape (n, times), at ascending times [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class GapStatistics:
+    """Times between two successive broadcasts of one agent, all agents together.
+
+    Attributes
+    ----------
+    gaps : ndarray
+        All of them [s], ascending.
+    """
+
+    gaps: NDArray[np.float64]
+
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.gaps)
+
+    @property
+    def min(self) -> float | None:
+        """Shortest [s]; None if there is none."""
+        return float(self.gaps[0]) if self.count else None
+
+    @property
+    def mean(self) -> float | None:
+        """Mean [s]; None if there is none."""
+        return float(np.mean(self.gaps)) if self.count else None
+
+    def quantiles(self, shares: Sequence[float] = QUANTILES) -> dict[float, float]:
+        """Share -> gap [s] that this share of the gaps does not exceed, by linear interpolation; empty without gaps."""
+        return {share: float(np.quantile(self.gaps, share)) for share in shares} if self.count else {}
+
+    def histogram(self, bins: int = 20) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Counts, shape (bins,), and their limits [s], shape (bins + 1,), a constant factor apart.
+
+        Raises
+        ------
+        ValueError
+            If there is no gap, or one is zero.
+        """
+        if not self.count or self.gaps[0] <= 0:
+            what = "there is none" if not self.count else "one is zero"
+            raise ValueError(f"a histogram with logarithmic classes needs positive gaps between broadcasts; {what}.")
+        low, high = self.gaps[0], self.gaps[-1]
+        limits = np.geomspace(low, high, bins + 1) if high > low else np.geomspace(low / 2, high * 2, bins + 1)
+        # Rounding must not put the extreme gaps outside.
+        limits[[0, -1]] = min(limits[0], low), max(limits[-1], high)
+        return np.histogram(self.gaps, limits)[0], limits
+
+
+def gap_statistics(event_times: Sequence[ArrayLike]) -> GapStatistics:
+    """Gaps of several agents from the times [s] of their broadcasts; the one at the start is no event."""
+    rows = [np.diff(np.asarray(times, dtype=float)) for times in event_times]
+    return GapStatistics(np.sort(np.concatenate([np.empty(0), *rows])))
+
+
+@dataclass(frozen=True, eq=False)
+class Communication:
+    """What a run sends.
+
+    Attributes
+    ----------
+    broadcasts : list of int
+        Of each agent, without the one at the start.
+    link_messages : list of int
+        Of each agent: one message for each neighbour at each broadcast, over all edges that can carry weight.
+    active_messages : list of int
+        The same over the edges that are switched on at the time. A neighbour that is not reached then still needs the
+        value when the edge comes back, so this is what must be sent later at the least.
+    duration : float
+        Of the run [s].
+    """
+
+    broadcasts: list[int]
+    link_messages: list[int]
+    active_messages: list[int]
+    duration: float
+
+    @property
+    def rate(self) -> float:
+        """Mean number of broadcasts of an agent per second."""
+        return sum(self.broadcasts) / len(self.broadcasts) / self.duration
+
+
+def communication(scenario: Scenario, event_times: Sequence[ArrayLike], duration: float | None = None) -> Communication:
+    """Count broadcasts and messages.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Network and switching.
+    event_times : sequence of array_like
+        Times [s] of each agent's broadcasts, as in `RunReport.event_times`.
+    duration : float, optional
+        Of the run [s]; the stop time by default.
+
+    Raises
+    ------
+    ValueError
+        If there is not one row of times for each agent.
+    """
+    n = scenario.network.agents
+    if len(event_times) != n:
+        raise ValueError(f"{len(event_times)} rows of broadcast times for {n} agents; give one row an agent.")
+    broadcasts, links, active = [], [], []
+    for agent, row in enumerate(event_times, start=1):
+        times, edges = np.asarray(row, dtype=float), edges_of(scenario, agent)
+        broadcasts.append(len(times))
+        links.append(len(times) * len(edges))
+        active.append(sum(int(scenario.switching.active_at(t)[edges].sum()) for t in times))
+    return Communication(broadcasts, links, active, scenario.stop_time if duration is None else duration)
+
+
+def run_states(scenario: Scenario, arc: HybridArc) -> States:
+    """The states of a run of ``closed_loop(scenario)`` as a function of time."""
+    names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
+    return lambda times: np.array([arc.at(name, times) for name in names])
+
+
+def disagreement(states: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``||x - mean(x) 1||``, shape (times,), of states of shape (n, times); it does not depend on the graph."""
+    return np.asarray(np.linalg.norm(states - states.mean(axis=0), axis=0))
+
+
+@dataclass(frozen=True)
+class Performance:
+    """How well a run agrees; all from ``d(t) = ||x(t) - mean(x(t)) 1||``.
+
+    Attributes
+    ----------
+    integral : float
+        ``int d^2 dt`` over the run, in the squared unit of the states times s.
+    ultimate : float
+        Largest d over the last quarter of the run.
+    settling : float or None
+        Time [s] from which on ``d <= level``; None if it is larger at the end.
+    level : float
+        The level of the settling time.
+    """
+
+    integral: float
+    ultimate: float
+    settling: float | None
+    level: float
+
+
+def performance(
+    scenario: Scenario, states: States, event_times: Sequence[ArrayLike] = (), level: float | None = None
+) -> Performance:
+    """Judge a run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran.
+    states : callable
+        Its states, from `run_states` or `PeriodicRun.at`.
+    event_times : sequence of array_like, optional
+        Times [s] of broadcasts, where the states have kinks.
+    level : float, optional
+        Of the settling time; by default a twentieth of the disagreement at the start.
+
+    Notes
+    -----
+    Between kinks d is smooth; d^2 is integrated by Simpson's rule on 16 parts of each stretch between breakpoints of
+    the weights, broadcasts and hundredths of the run.
+    """
+    times = _grid(scenario, event_times)
+    values = disagreement(states(times))
+    wanted = float(values[0]) / 20 if level is None else level
+    late = times >= _LATE * scenario.stop_time
+    return Performance(
+        integral=_simpson(times, values**2),
+        ultimate=float(np.max(values[late])),
+        settling=settling_time(lambda t: disagreement(states(t)), times, wanted),
+        level=wanted,
+    )
+
+
+def settling_time(
+    value: Callable[[NDArray[np.float64]], NDArray[np.float64]], times: NDArray[np.float64], level: float
+) -> float | None:
+    """The time [s] from which on a value stays at or below a level.
+
+    Parameters
+    ----------
+    value : callable
+        Continuous, of times [s].
+    times : ndarray
+        Ascending grid from the start to the end of the run; an excursion between two of its points is not seen.
+    level : float
+        Where to settle.
+
+    Returns
+    -------
+    float or None
+        The last crossing, located to rounding; the start if the value never exceeds the level, None if it does so at
+        the end.
+    """
+    above = np.flatnonzero(value(times) > level)
+    if not above.size:
+        return float(times[0])
+    last = int(above[-1])
+    if last == len(times) - 1:
+        return None
+
+    def excess(t: float) -> float:
+        return float(value(np.array([t]))[0]) - level
+
+    return (
+        float(brentq(excess, times[last], times[last + 1], xtol=1e-13))
+        if excess(times[last + 1]) < 0
+        else float(times[last + 1])
+    )
+
+
+def run_metrics(scenario: Scenario, arc: HybridArc, level: float | None = None) -> dict[str, Any]:
+    """All metrics of a run of ``closed_loop(scenario)`` as one object for JSON; of its part if it ended early."""
+    scenario = replace(scenario, stop_time=float(arc.t[-1]))
+    times = run_report(scenario, arc).event_times
+    sent, gaps = communication(scenario, times), gap_statistics(times)
+    judged = performance(scenario, run_states(scenario, arc), times, level)
+    return {
+        "broadcasts": sent.broadcasts,
+        "link_messages": sent.link_messages,
+        "active_messages": sent.active_messages,
+        "duration": sent.duration,
+        "rate": sent.rate,
+        "gaps": {
+            "count": gaps.count,
+            "min": gaps.min,
+            "mean": gaps.mean,
+            "quantiles": {str(share): gap for share, gap in gaps.quantiles().items()},
+        },
+        "integral": judged.integral,
+        "ultimate": judged.ultimate,
+        "settling": {"time": judged.settling, "level": judged.level},
+    }
+
+
+def _grid(scenario: Scenario, event_times: Sequence[ArrayLike]) -> NDArray[np.float64]:
+    end = scenario.stop_time
+    rows = [np.asarray(times, dtype=float) for times in event_times]
+    cuts = np.concatenate([np.linspace(0.0, end, 101), scenario.edge_weights.breakpoints(0.0, end), *rows])
+    cuts = np.unique(cuts[(cuts >= 0) & (cuts <= end)])
+    steps = np.arange(_POINTS_PER_PIECE) / _POINTS_PER_PIECE
+    return np.append((cuts[:-1, None] + np.diff(cuts)[:, None] * steps).ravel(), end)
+
+
+def _simpson(times: NDArray[np.float64], values: NDArray[np.float64]) -> float:
+    left, middle, right = values[:-2:2], values[1:-1:2], values[2::2]
+    return float(np.sum((times[2::2] - times[:-2:2]) / 6 * (left + 4 * middle + right)))

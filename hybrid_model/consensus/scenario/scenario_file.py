@@ -1,0 +1,189 @@
+"""Scenario files: TOML in, checked scenario out; presets by name."""
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.affordable import require_affordable
+from hybrid_model.consensus.scenario.channel_data import IDEAL
+from hybrid_model.consensus.scenario.read_switching import read_switching
+from hybrid_model.consensus.scenario.read_weights import read_weights
+from hybrid_model.consensus.scenario.scenario_data import (
+    Channel,
+    Network,
+    Scenario,
+    Trigger,
+    TriggerKind,
+    Underlying,
+    WeightKind,
+    Weights,
+    replace_trigger,
+)
+from hybrid_model.consensus.scenario.tables import Table, suggestion
+from hybrid_model.consensus.scenario.trigger_data import trigger_keys
+from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching, Switching
+
+__all__ = [
+    "Channel",
+    "Network",
+    "NoSwitching",
+    "PeriodicSwitching",
+    "Scenario",
+    "ScenarioError",
+    "Switching",
+    "Trigger",
+    "TriggerKind",
+    "Underlying",
+    "WeightKind",
+    "Weights",
+    "load_scenario",
+    "preset_names",
+    "read_scenario",
+    "replace_trigger",
+]
+
+_PRESETS = resources.files("hybrid_model.consensus.scenario") / "presets"
+
+
+def preset_names() -> tuple[str, ...]:
+    """Names of the scenarios that come with the package, sorted."""
+    return tuple(
+        sorted(entry.name.removesuffix(".toml") for entry in _PRESETS.iterdir() if entry.name.endswith(".toml"))
+    )
+
+
+def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
+    """Load a preset by its name or a scenario file by its path.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        The name of a preset (`preset_names`), also followed by ``-static`` or ``-dynamic`` for the same scenario with
+        that trigger; or the path of a TOML file, recognised by its suffix or by a folder in front.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such preset or file, the file is not TOML, or it breaks a rule; the message names the entry.
+    """
+    name = os.fspath(name_or_path)
+    if not isinstance(name_or_path, str) or name.endswith(".toml") or os.path.dirname(name):
+        return _load_file(Path(name))
+    names = preset_names()
+    base, _, kind = name.rpartition("-")
+    if name in names:
+        return _parse(f"preset '{name}'", (_PRESETS / f"{name}.toml").read_bytes())
+    if base in names and kind in [member.value for member in TriggerKind]:
+        return replace(replace_trigger(load_scenario(base), kind), name=name)
+    raise ScenarioError(
+        f"there is no preset '{name}'.{suggestion(name, names)} Presets: {', '.join(names)}; "
+        "a scenario file is given by a path that ends in .toml."
+    )
+
+
+def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Scenario:
+    """Build a scenario from the parsed entries of a scenario file.
+
+    Parameters
+    ----------
+    entries : Mapping
+        The parsed entries.
+    folder : str or path
+        Where the names of files in them count from; `load_scenario` gives the folder of the scenario file.
+
+    Raises
+    ------
+    ScenarioError
+        If a key is unknown or missing, or a value has the wrong type or is out of range; the message names the entry.
+    """
+    top = Table("the scenario", entries, ("name", "stop_time", "network", "weights", "switching", "trigger", "channel"))
+    network = _read_network(_subtable(top, "network", ("agents", "edges", "initial", "gain", "underlying")))
+    edge_count = len(network.edges)
+    scenario = Scenario(
+        name=top.text("name"),
+        stop_time=top.number("stop_time"),
+        network=network,
+        weights=read_weights(lambda known: _subtable(top, "weights", known), edge_count, Path(folder)),
+        switching=_read_switching(top, network, top.number("stop_time")),
+        trigger=_read_trigger(top),
+        channel=_read_channel(top),
+    )
+    require_affordable(scenario)
+    return scenario
+
+
+def _load_file(path: Path) -> Scenario:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise ScenarioError(f"the scenario file {path} cannot be read: {error.strerror}.") from error
+    return _parse(f"the scenario file {path}", content, path.parent)
+
+
+def _parse(source: str, content: bytes, folder: Path = Path()) -> Scenario:
+    try:
+        entries = tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"{source} is not a text in UTF-8: byte {error.start} cannot be decoded.") from error
+    except ValueError as error:
+        # Of the parser, or of Python for an integer with thousands of digits.
+        raise ScenarioError(f"{source} is not valid TOML: {str(error).partition(';')[0]}.") from error
+    except RecursionError as error:
+        raise ScenarioError(f"{source} is not valid TOML: its tables or lists are nested too deeply.") from error
+    try:
+        return read_scenario(entries, folder)
+    except ScenarioError as error:
+        raise ScenarioError(f"{source}: {error}") from error
+
+
+def _subtable(top: Table, name: str, known: tuple[str, ...]) -> Table:
+    entries = top.raw(name, f"must be a table, written [{name}]")
+    if not isinstance(entries, dict):
+        raise top.error(name, entries, f"must be a table, written [{name}]")
+    return Table(f"[{name}]", entries, known)
+
+
+def _read_network(table: Table) -> Network:
+    edges = table.whole_number_lists("edges")
+    for number, edge in enumerate(edges, start=1):
+        if len(edge) != 2:
+            raise table.error(f"edges[{number}]", list(edge), "must be a pair of agents, such as [1, 2]")
+    return Network(
+        agents=table.whole_number("agents"),
+        edges=tuple((edge[0], edge[1]) for edge in edges),
+        initial=table.numbers("initial"),
+        gain=table.number("gain", default=1.0),
+        underlying=table.choice("underlying", Underlying, default=Underlying.LISTED),
+    )
+
+
+def _read_switching(top: Table, network: Network, stop_time: float) -> Switching:
+    if "switching" not in top:
+        return NoSwitching(len(network.edges))
+    return read_switching(lambda known: _subtable(top, "switching", known), network, stop_time)
+
+
+def _read_trigger(top: Table) -> Trigger:
+    # The kind decides which keys are known, so it is read from a table that accepts whatever is given.
+    given = top.raw("trigger", "must be a table, written [trigger]")
+    kind = _subtable(top, "trigger", tuple(given) if isinstance(given, dict) else ()).choice("kind", TriggerKind)
+    defaults = trigger_keys(kind)
+    table = _subtable(top, "trigger", ("kind", *defaults))
+    return Trigger(kind, **{key: table.number(key, default) for key, default in defaults.items()})
+
+
+def _read_channel(top: Table) -> Channel:
+    if "channel" not in top:
+        return IDEAL
+    table = _subtable(top, "channel", ("delay", "loss", "seed", "slots"))
+    return Channel(
+        delay=table.number("delay", default=0.0),
+        loss=table.number("loss", default=0.0),
+        seed=table.whole_number("seed") if "seed" in table else IDEAL.seed,
+        slots=table.whole_number("slots") if "slots" in table else IDEAL.slots,
+    )

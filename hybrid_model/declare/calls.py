@@ -1,0 +1,83 @@
+"""Calls with arguments that a function does not have, answered by one sentence."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from typing import Any, ParamSpec, TypeVar
+
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.real_numbers import told
+from hybrid_model.declare.signatures import meant
+from hybrid_model.declare.variables import Kind
+from hybrid_model.errors import SimulationError
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def explained(
+    error_class: type[Exception] = SimulationError, /, **options: type
+) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Return a decorator of a function that runs an automaton: it says what to write in the place of unknown arguments.
+
+    Parameters
+    ----------
+    error_class : type
+        What is raised.
+    **options : type
+        Argument -> class of what it takes; the fields of that class are often given to the function itself.
+    """
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        signature = inspect.signature(function)
+
+        @functools.wraps(function)
+        def call(*given: P.args, **named: P.kwargs) -> R:
+            try:
+                signature.bind(*given, **named)
+            except TypeError as error:
+                raise error_class(_sentence(function.__name__, signature, options, given, named)) from error
+            return function(*given, **named)
+
+        return call
+
+    return decorate
+
+
+def _sentence(
+    called: str,
+    signature: inspect.Signature,
+    options: Mapping[str, type],
+    given: tuple[Any, ...],
+    named: Mapping[str, Any],
+) -> str:
+    by_place = [p.name for p in signature.parameters.values() if p.kind is p.POSITIONAL_OR_KEYWORD]
+    by_name = [name for name in signature.parameters if name not in by_place]
+    if len(given) > len(by_place):
+        return (
+            f"{called} takes {' and '.join(by_place)} by position, but {len(given)} arguments were given: give the "
+            f"others by name, {'=..., '.join(by_name)}=...."
+        )
+    for name, value in named.items():
+        if name not in signature.parameters:
+            owner = given[0] if given else named.get(by_place[0])
+            return f"{called} has no option {name!r}{_instead(name, value, options, owner, by_name)}."
+    missing = [name for name in by_place[len(given) :] if name not in named]
+    if not missing:
+        return f"{called} was given {by_place[0]} twice: give it by position or by name."
+    return f"{called} needs {' and '.join(missing)}: write {called}({', '.join(by_place)})."
+
+
+def _instead(name: str, value: Any, options: Mapping[str, type], owner: Any, known: list[str]) -> str:
+    for option, kind in options.items():
+        if dataclasses.is_dataclass(kind) and name in (field.name for field in dataclasses.fields(kind)):
+            return f": write {option}=hm.{kind.__name__}({name}={told(value)})"
+    variables = {v.name: v for v in owner.variables} if isinstance(owner, Automaton) else {}
+    if name in variables and variables[name].kind is Kind.INPUT:
+        return f": write inputs={{{name!r}: {told(value)}}}"
+    if name in variables:
+        return f": values are given when an instance is made, {type(owner).__name__}({name}={told(value)})"
+    return meant(name, known)

@@ -1,0 +1,245 @@
+"""Inputs of a run: constants, functions of time, and functions with known discontinuities."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from hybrid_model.declare.layout import Layout, Place
+from hybrid_model.declare.real_numbers import real_array, told
+from hybrid_model.declare.signatures import ExplainedCall, require_map
+from hybrid_model.declare.tuning import Steps, tuned_value
+from hybrid_model.declare.variables import FloatArray, Kind, Variable, start_array, unknown_name
+from hybrid_model.errors import DeclarationError, SimulationError
+
+
+@dataclass(frozen=True)
+class Signal(ExplainedCall):
+    """A function of time that jumps at known times, or does something short there.
+
+    A run sees a plain function of time only at the points that its solver chooses, and steps over a pulse between two
+    of them in silence; it never steps over a breakpoint. A pulse is ``Signal(lambda t: 1.0 if 50 <= t < 50.1 else 0.0,
+    [50, 50.1])``.
+
+    Attributes
+    ----------
+    value : callable
+        ``value(t) -> float or array``, continuous from the right.
+    breakpoints : sequence of float
+        Times in s at which it is discontinuous; runs stop there and go on.
+    """
+
+    value: Callable[[float], npt.ArrayLike]
+    breakpoints: Sequence[float] = ()
+
+    def __post_init__(self) -> None:
+        require_map("value of a Signal", self.value, ("t",))
+
+
+InputValue = npt.ArrayLike | Callable[[float], npt.ArrayLike] | Signal
+
+
+class Inputs:
+    """What comes from outside as functions of time: the input vector u of an automaton, and its parameter vector p.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the automaton.
+    given : mapping, optional
+        Input name -> number, array, function of time or `Signal`; inputs not named keep their start values. A tunable
+        parameter is given like a discrete input: it takes the value of its `Signal` at the start and at each
+        breakpoint, and holds it in between.
+
+    Raises
+    ------
+    DeclarationError
+        For an unknown input, a parameter that is not tunable, or a value of the wrong shape.
+    """
+
+    def __init__(self, layout: Layout, given: Mapping[str, InputValue] | None = None) -> None:
+        self._layout = layout
+        self._held = layout.start(Kind.INPUT)
+        self._signals: list[tuple[Place, Callable[[float], npt.ArrayLike]]] = []
+        self._parameters = layout.start(Kind.PARAMETER)
+        self._tuned: list[tuple[Place, Steps]] = []
+        breakpoints: list[float] = []
+        places = {place.variable.name: place for place in layout.places[Kind.INPUT]}
+        parameters = {place.variable.name: place for place in layout.places[Kind.PARAMETER]}
+        for name, value in (given or {}).items():
+            if name in parameters:
+                breakpoints += self._tune(parameters[name], value)
+            elif name not in places:
+                raise DeclarationError(unknown_input(layout.automaton.name, name, places))
+            elif isinstance(value, Signal):
+                self._signals.append((places[name], value.value))
+                breakpoints += _finite_breakpoints(name, value)
+            elif callable(value):
+                require_map(f"input {name}", value, ("t",))
+                if places[name].variable.discrete:
+                    raise DeclarationError(
+                        f"{layout.automaton.name}: input {name} changes at jumps only, so it cannot be a plain "
+                        "function of time: give a number, or a Signal with the times at which it changes."
+                    )
+                self._signals.append((places[name], value))
+            else:
+                self.hold(name, value)
+        self._breakpoints = sorted(breakpoints)
+
+    def _tune(self, place: Place, value: InputValue) -> list[float]:
+        """Take what is given for a parameter, and return its breakpoints."""
+        owner, name = self._layout.automaton.name, place.variable.name
+        require_tunable(owner, place.variable, value)
+        if isinstance(value, Signal):
+            times = _finite_breakpoints(name, value)
+            self._tuned.append((place, Steps(place.variable, value.value, times)))
+            return times
+        assert not callable(value)
+        self._parameters[place.at] = tuned_value(place.variable, value)
+        return []
+
+    def parameters_at(self, t: float) -> FloatArray:
+        """Return p at time `t`, continuous from the right; the array must not be written to."""
+        if not self._tuned:
+            return self._parameters
+        p = self._parameters.copy()
+        for place, steps in self._tuned:
+            p[place.at] = steps.at(t)
+        return p
+
+    def parameter_steps(self, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+        """Return the times in [t0, t1] from which on p is constant, t0 first, and p from there, one row a time."""
+        times = sorted({t0, *(b for _, steps in self._tuned for b in steps.times if t0 < b <= t1)})
+        return np.array(times), np.array([self.parameters_at(t) for t in times])
+
+    def hold_parameter(self, index: int, value: float) -> bool:
+        """Set one scalar of p to a constant; return whether that changed it."""
+        changed = bool(self._parameters[index] != value)
+        if changed:
+            self._parameters = self._parameters.copy()
+            self._parameters[index] = value
+        return changed
+
+    def hold(self, name: str, value: npt.ArrayLike) -> bool:
+        """Set an input to a constant; return whether that changed it."""
+        place = next((q for q in self._layout.places[Kind.INPUT] if q.variable.name == name), None)
+        if place is None:
+            raise DeclarationError(unknown_input(self._layout.automaton.name, name, dict.fromkeys(self.names)))
+        given = start_array(f"{self._layout.automaton.name}.{name}", value)
+        if given.shape not in ((), place.variable.shape):
+            raise DeclarationError(
+                f"input {name} has shape {place.variable.shape}, but the value given has shape {given.shape}: give one "
+                "number, or an array of that shape; a table over time is a function, "
+                "lambda t: np.interp(t, times, values)."
+            )
+        before, self._held = self._held, self._held.copy()
+        self._held[place.at] = given.ravel() if given.shape else given
+        return not np.array_equal(before, self._held)
+
+    def hold_element(self, index: int, value: float) -> bool:
+        """Set one scalar of u to a constant; return whether that changed it."""
+        changed = bool(self._held[index] != value)
+        if changed:
+            self._held = self._held.copy()
+            self._held[index] = value
+        return changed
+
+    @property
+    def held(self) -> FloatArray:
+        """The constants in u; the array must not be written to."""
+        return self._held
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the inputs."""
+        return [place.variable.name for place in self._layout.places[Kind.INPUT]]
+
+    @property
+    def vary(self) -> bool:
+        """Whether some input is a function of time."""
+        return bool(self._signals)
+
+    def at(self, t: float) -> FloatArray:
+        """Return u at time `t`; the array must not be written to."""
+        return self.with_held(self._held, t)
+
+    def with_held(self, held: FloatArray, t: float) -> FloatArray:
+        """Return u at time `t` as it is with other constants in it; the array must not be written to."""
+        if not self._signals:
+            return held
+        u = held.copy()
+        for place, signal in self._signals:
+            u[place.at] = _sample(place.variable, signal, t)
+        return u
+
+    def next_breakpoint(self, t: float) -> float:
+        """Return the first breakpoint after `t`, or infinity."""
+        return next((b for b in self._breakpoints if b > t), math.inf)
+
+    def copy(self) -> Inputs:
+        """Return an independent copy."""
+        other = copy.copy(self)
+        other._held = self._held.copy()
+        return other
+
+
+def require_tunable(owner: str, variable: Variable, value: InputValue) -> None:
+    """Refuse to change a parameter that is fixed for a run, or in another way than at events.
+
+    Raises
+    ------
+    DeclarationError
+        With what to give instead.
+    """
+    if not variable.tunable:
+        raise DeclarationError(
+            f"{owner}: parameter {variable.name} is fixed for a run: give its value when the instance is made, or "
+            "declare it with tunable=True."
+        )
+    if callable(value) and not isinstance(value, Signal):
+        raise DeclarationError(
+            f"{owner}: parameter {variable.name} changes at events only, so it cannot be a plain function of time: "
+            "give a number, or a Signal with the times at which it changes."
+        )
+
+
+def unknown_input(owner: str, name: str, known: Mapping[str, object]) -> str:
+    """Return the sentence for an input that an automaton does not have."""
+    if not known:
+        return f"{owner} has no input {name!r}; it has no inputs: leave it out."
+    return unknown_name(f"{owner} (inputs)", name, known)
+
+
+def _finite_breakpoints(name: str, signal: Signal) -> list[float]:
+    try:
+        breakpoints = real_array(signal.breakpoints)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DeclarationError(
+            f"input {name} has the breakpoints {told(signal.breakpoints)}: give times in s."
+        ) from error
+    if breakpoints.ndim != 1 or not np.isfinite(breakpoints).all():
+        raise DeclarationError(
+            f"input {name} has the breakpoints {told(signal.breakpoints)}: give a sequence of finite times in s."
+        )
+    return [float(b) for b in breakpoints]
+
+
+def _sample(variable: Variable, signal: Callable[[float], npt.ArrayLike], t: float) -> FloatArray:
+    given = signal(t)
+    try:
+        value = real_array(given)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SimulationError(f"input {variable.name} is {told(given)} at t = {t:.9g} s: return numbers.") from error
+    if value.shape not in ((), variable.shape):
+        raise SimulationError(
+            f"input {variable.name} has shape {variable.shape}, but its function gives shape {value.shape} at "
+            f"t = {t:.9g} s: return one number for all elements, or an array of shape {variable.shape}."
+        )
+    if not np.all(np.isfinite(value)):
+        raise SimulationError(f"input {variable.name} is {value} at t = {t:.9g} s: inputs must be finite.")
+    return value.ravel() if value.shape else value

@@ -1,0 +1,80 @@
+"""Tunable parameters in time: constant between the instants at which somebody sets them."""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from hybrid_model.declare.variables import FloatArray, Variable, start_array
+from hybrid_model.errors import DeclarationError, SimulationError
+
+
+class Steps:
+    """A tunable parameter as a function of time: what `value` gives at the start and at each breakpoint, held.
+
+    The function is called in order of need, so it never looks beyond the time that is asked for, nor before the first
+    one.
+
+    Parameters
+    ----------
+    variable : Variable
+        The parameter.
+    value : callable
+        ``value(t) -> float or array``.
+    breakpoints : sequence of float
+        Times in s at which it changes, in any order.
+    """
+
+    def __init__(
+        self, variable: Variable, value: Callable[[float], npt.ArrayLike], breakpoints: Sequence[float]
+    ) -> None:
+        self._variable, self._value = variable, value
+        self.times = sorted(breakpoints)
+        self._origin: float | None = None
+        self._known: dict[int, FloatArray] = {}
+
+    def at(self, t: float) -> FloatArray:
+        """Return the value at `t` in s, row by row; continuous from the right.
+
+        Raises
+        ------
+        SimulationError
+            If the function gives what the parameter cannot be.
+        """
+        if self._origin is None:
+            self._origin = t
+        row = bisect.bisect_right(self.times, t)
+        if row not in self._known:
+            since = self._origin if row == 0 else max(self.times[row - 1], self._origin)
+            try:
+                self._known[row] = tuned_value(self._variable, self._value(since))
+            except DeclarationError as error:
+                raise SimulationError(f"at t = {since:.9g} s {error}") from error
+        return self._known[row]
+
+
+def tuned_value(variable: Variable, given: npt.ArrayLike) -> FloatArray:
+    """Return a new value of a tunable parameter, row by row and of its full size.
+
+    Raises
+    ------
+    DeclarationError
+        If it has another shape, is not finite, lies outside the parameter's range, or is a fraction where the parameter
+        holds whole numbers.
+    """
+    value = start_array(f"parameter {variable.name}", given)
+    told = f"parameter {variable.name} is set to {given!r}"
+    if value.shape not in ((), variable.shape):
+        raise DeclarationError(
+            f"{told}, of shape {value.shape}: give one number for all elements, or an array of shape {variable.shape}."
+        )
+    low = -np.inf if variable.minimum is None else variable.minimum
+    high = np.inf if variable.maximum is None else variable.maximum
+    if not (low <= value).all() or not (value <= high).all():
+        raise DeclarationError(f"{told}, outside its range from {low:g} to {high:g}: give a value within it.")
+    if variable.integer and (value != np.round(value)).any():
+        raise DeclarationError(f"{told}, but it holds whole numbers: round it.")
+    return np.full(variable.size, value) if value.shape == () else value.ravel()

@@ -1,0 +1,9 @@
+"""The C files of the engine, which knows nothing of FMI."""
+
+from pathlib import Path
+
+__all__ = ["ENGINE_FOLDERS"]
+
+_ENGINE = Path(__file__).resolve().parents[1] / "engine"
+ENGINE_FOLDERS = (_ENGINE, _ENGINE / "networks")
+"""Folders of its C sources and headers; files of both include each other by name alone."""

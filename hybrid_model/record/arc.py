@@ -1,0 +1,421 @@
+"""Hybrid arcs: the result of a run on hybrid time (t, j)."""
+
+from __future__ import annotations
+
+import bisect
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.real_numbers import real_array, told
+from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, unknown_name
+from hybrid_model.errors import DataError, DeclarationError
+from hybrid_model.record.arc_values import ArcValues, ComputedValues
+from hybrid_model.record.flow_record import FlowRecord as FlowRecord
+from hybrid_model.record.samples import Samples
+from hybrid_model.stop import Stop
+
+if TYPE_CHECKING:
+    from hybrid_model.reference.execution import Execution, JumpRecord
+
+Interval = tuple[float, float]
+
+
+class HybridArc:
+    """A run of an automaton: its samples on hybrid time, its jumps, and why it ended.
+
+    Attributes
+    ----------
+    t, j : ndarray, shape (n,)
+        Hybrid time of the samples: every solver step and both sides of every jump.
+    jumps : list of JumpRecord
+        In order, with the states on both sides.
+    stop : Stop
+        Why the run ended; its value is the remedy. A restricted arc keeps the reason of the whole run.
+    message : str
+        The particulars of the end, with names and numbers.
+    event_tolerance : float
+        Longest time in s that the run has taken for one instant, see `Solver`.
+    automaton : Automaton
+        What ran. That of a loaded arc has names, variables and jumps, but no maps.
+    """
+
+    def __init__(self, execution: Execution, flows: Sequence[FlowRecord], jumps: list[JumpRecord]) -> None:
+        assert execution.stopped is not None
+        read = ComputedValues(execution.automaton, execution.inputs)
+        self._fill(read, flows, jumps, execution.stopped, execution.message, execution.event_tolerance)
+
+    @classmethod
+    def recorded(
+        cls,
+        read: ArcValues,
+        flows: Sequence[FlowRecord],
+        jumps: Sequence[JumpRecord],
+        *,
+        stop: Stop,
+        message: str,
+        event_tolerance: float,
+        first_j: int = 0,
+    ) -> HybridArc:
+        """Make an arc from flows that are there already, such as those of a file.
+
+        Parameters
+        ----------
+        read : ArcValues
+            Reads variables off the flows.
+        flows : sequence of FlowRecord
+            In order; one more than jumps.
+        jumps : sequence of JumpRecord
+            Jump k leads from flow k to flow k + 1.
+        stop, message, event_tolerance
+            See `HybridArc`.
+        first_j : int
+            Jump count of the first flow.
+        """
+        arc = object.__new__(cls)
+        arc._fill(read, flows, jumps, stop, message, event_tolerance, first_j)
+        return arc
+
+    def _fill(
+        self,
+        read: ArcValues,
+        flows: Sequence[FlowRecord],
+        jumps: Sequence[JumpRecord],
+        stop: Stop,
+        message: str,
+        event_tolerance: float,
+        first_j: int = 0,
+    ) -> None:
+        self._read = read
+        self._flows = list(flows)
+        self._first_j = first_j
+        self.automaton: Automaton = read.automaton
+        self.jumps = list(jumps)
+        self.stop = stop
+        self.message = message
+        self.event_tolerance = event_tolerance
+        self._starts, self._ends = [flow.t0 for flow in flows], [flow.t1 for flow in flows]
+        times = [[t for t, _ in flow.points] for flow in self._flows]
+        self.t: FloatArray = np.concatenate([np.array(row) for row in times])
+        self.j = np.concatenate([np.full(len(row), first_j + k) for k, row in enumerate(times)])
+
+    def __repr__(self) -> str:
+        return (
+            f"HybridArc({self.automaton.name}: t from {self.t[0]:g} to {self.t[-1]:g} s, {len(self.jumps)} jumps, "
+            f"{self.stop.name})"
+        )
+
+    def __getattr__(self, name: str) -> Any:
+        automaton = vars(self).get("automaton")
+        if automaton is not None and any(name == variable.name for variable in automaton.variables):
+            raise DeclarationError(f"a run has no attribute {name!r}: write arc[{name!r}] for the samples of {name}.")
+        raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+
+    def __getitem__(self, name: str) -> FloatArray:
+        """Return a variable's samples, shape (n, *shape): a state, input, parameter or output."""
+        shape = self._read.variable(name).shape
+        rows = [self._read.value(name, t, x, flow.z) for flow in self._flows for t, x in flow.points]
+        return np.array(rows, dtype=np.float64).reshape(len(self.t), *shape)
+
+    def variable(self, name: str) -> Variable:
+        """Return the declaration of a variable: its unit, description, shape.
+
+        Raises
+        ------
+        DeclarationError
+            For an unknown name.
+        """
+        return self._read.variable(name)
+
+    def at(self, name: str, t: npt.ArrayLike, *, before: bool = False, j: npt.ArrayLike | None = None) -> FloatArray:
+        """Return a variable at given times, interpolated by the solver's dense output.
+
+        Parameters
+        ----------
+        name : str
+            A variable of the automaton.
+        t : float or array_like
+            Times in s within the run.
+        before : bool
+            At the time of a jump return the value before it (in a cascade, before the first); default: after the last
+            jump at that time.
+        j : int or array_like, optional
+            Jump counts: the value at hybrid time (t, j), so that every side of every jump of a cascade can be had.
+
+        Returns
+        -------
+        ndarray
+            Shape of `t` (with `j`: what both broadcast to) followed by the variable's shape.
+
+        Raises
+        ------
+        DeclarationError
+            For an unknown name or a hybrid time outside the run.
+        """
+        shape = self.variable(name).shape
+        times = _times(t)
+        if j is None:
+            self._require_inside(times)
+            flows = [self._flow_at(float(time), before) for time in times.ravel()]
+        else:
+            times, counts = np.broadcast_arrays(times, np.asarray(j))
+            flows = [
+                self._flow_on(float(time), count) for time, count in zip(times.ravel(), counts.ravel(), strict=True)
+            ]
+        values = [
+            self._read.value(name, float(time), flow.at(float(time)), flow.z)
+            for time, flow in zip(times.ravel(), flows, strict=True)
+        ]
+        return np.array(values, dtype=np.float64).reshape(times.shape + shape)
+
+    # Parts of a run.
+
+    def restrict(self, *, t: Interval | None = None, j: Interval | None = None) -> HybridArc:
+        """Return the part of the run in an interval of t, of j, or of both, on the same hybrid time.
+
+        Parameters
+        ----------
+        t : (float, float), optional
+            Closed interval in s: jumps at its ends belong to it with both sides. Flows are cut by their dense output.
+        j : (int, int), optional
+            First and last jump count kept: flows number `j[0]` to `j[1]` and the jumps between them.
+
+        Returns
+        -------
+        HybridArc
+            With the jump counts of the whole run, and its `stop` and `message`.
+
+        Raises
+        ------
+        DeclarationError
+            For an interval whose end is not at or after its start, or in which nothing of the run lies.
+        """
+        a, b = _interval("t", t)
+        first, last = _interval("j", j)
+        kept = [
+            k
+            for k, flow in enumerate(self._flows)
+            if first <= self._first_j + k <= last and flow.t1 >= a and flow.t0 <= b
+        ]
+        if not kept:
+            raise DeclarationError(
+                f"nothing of the run lies in t = [{a:g}, {b:g}] s and j = [{first:g}, {last:g}]: it covers "
+                f"t = [{self.t[0]:g}, {self.t[-1]:g}] s and j = [{self.j[0]}, {self.j[-1]}]."
+            )
+        return HybridArc.recorded(
+            self._read,
+            [self._flows[k].cut(a, b) for k in kept],
+            self.jumps[kept[0] : kept[-1]],
+            stop=self.stop,
+            message=self.message,
+            event_tolerance=self.event_tolerance,
+            first_j=self._first_j + kept[0],
+        )
+
+    def resample(self, grid: npt.ArrayLike, names: Iterable[str] | None = None, *, both_sides: bool = False) -> Samples:
+        """Return variables at given times.
+
+        Parameters
+        ----------
+        grid : array_like, shape (n,)
+            Times in s within the run.
+        names : iterable of str, optional
+            Which variables; default: all but the parameters that are fixed for a run.
+        both_sides : bool
+            Whether a time at which the run jumps gives two rows, before its first and after its last jump there;
+            default: one row, after the last.
+
+        Returns
+        -------
+        Samples
+            With the jump count of every row.
+
+        Raises
+        ------
+        DeclarationError
+            For an unknown name or a time outside the run.
+        """
+        times = np.atleast_1d(_times(grid))
+        self._require_inside(times)
+        after = np.searchsorted(self._starts, times, side="right") - 1
+        if both_sides:
+            before = np.minimum(np.searchsorted(self._ends, times, side="left"), after)
+            rows = np.where(before < after, 2, 1)
+            times, number = np.repeat(times, rows), np.repeat(after, rows)
+            # The first of two rows.
+            firsts = np.cumsum(rows) - rows
+            number[firsts] = before
+        else:
+            number = after
+        points = [(float(t), self._flows[k]) for t, k in zip(times, number, strict=True)]
+        values = self._table(names, [(t, flow.at(t), flow.z) for t, flow in points])
+        return Samples(times, number + self._first_j, values)
+
+    def samples(self, names: Iterable[str] | None = None) -> Samples:
+        """Return the run's own samples: every solver step and both sides of every jump.
+
+        Parameters
+        ----------
+        names : iterable of str, optional
+            Which variables; default: all but the parameters that are fixed for a run.
+        """
+        points = [(t, x, flow.z) for flow in self._flows for t, x in flow.points]
+        return Samples(self.t.copy(), self.j.copy(), self._table(names, points))
+
+    # Jumps and lengths.
+
+    def event_times(self, name: str) -> FloatArray:
+        """Return the times in s of the jumps called `name`."""
+        if name not in [info.name for info in self.automaton.jumps]:
+            known = {info.name: info for info in self.automaton.jumps}
+            raise DeclarationError(unknown_name(f"{self.automaton.name} (jumps)", name, known))
+        return np.array([jump.t for jump in self.jumps if jump.name == name])
+
+    @property
+    def flow_lengths(self) -> FloatArray:
+        """Length in s of the flow at each j, shape (number of jumps + 1,); zero inside a cascade."""
+        return np.array([flow.t1 - flow.t0 for flow in self._flows])
+
+    def inter_event_times(self, name: str | None = None) -> FloatArray:
+        """Return the times in s between successive jumps.
+
+        Parameters
+        ----------
+        name : str, optional
+            Only jumps of this name; default: all jumps but those declared internal.
+        """
+        if name is not None:
+            return np.diff(self.event_times(name))
+        internal = {info.name for info in self.automaton.jumps if info.internal}
+        return np.diff(np.array([jump.t for jump in self.jumps if jump.name not in internal]))
+
+    def before(self, jump: JumpRecord) -> Values:
+        """Return all values just before a jump of this arc."""
+        flow = self._flow_of(jump.j)
+        return self._read.values(flow.t1, flow.at(flow.t1), flow.z)
+
+    def after(self, jump: JumpRecord) -> Values:
+        """Return all values just after a jump of this arc."""
+        flow = self._flow_of(jump.j + 1)
+        return self._read.values(flow.t0, flow.x0, flow.z)
+
+    @property
+    def end(self) -> Values:
+        """All values at the end of the run."""
+        flow = self._flows[-1]
+        return self._read.values(flow.t1, flow.at(flow.t1), flow.z)
+
+    def interpolation_error(self, name: str) -> FloatArray:
+        """Return how far interpolated values may lie from the solver's dense output, in the variable's unit and shape.
+
+        Zero in a run. In an arc from a file the largest error seen when it was saved: rounding, but for variables with
+        fast oscillations or discontinuities inside a step.
+        """
+        return self._read.interpolation_error(name)
+
+    # Other forms.
+
+    def to_dataframe(self, names: Iterable[str] | None = None) -> Any:
+        """Return the samples as a pandas DataFrame, see `hybrid_model.record.arc_tables.dataframe`."""
+        from hybrid_model.record.arc_tables import dataframe
+
+        return dataframe(self, names)
+
+    def to_xarray(self, names: Iterable[str] | None = None) -> Any:
+        """Return the samples as an xarray Dataset, see `hybrid_model.record.arc_tables.dataset`."""
+        from hybrid_model.record.arc_tables import dataset
+
+        return dataset(self, names)
+
+    def save(self, path: str | Path) -> None:
+        """Write the arc to a file; its name decides in which form.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``*.npz``: the complete arc, which `load_arc` reads, see `hybrid_model.record.arc_file`. ``*.csv``: the
+            samples alone, which `Samples.from_csv` reads.
+
+        Raises
+        ------
+        DataError
+            For a name with another ending.
+        """
+        from hybrid_model.record.arc_file import save_arc
+
+        ending = Path(path).suffix.lower()
+        if ending == ".csv":
+            self.samples().to_csv(path)
+        elif ending == ".npz":
+            save_arc(self._read, self._flows, self, Path(path))
+        else:
+            raise DataError(
+                f"{path} ends in {ending!r}, but an arc is saved as .npz, which hm.load_arc reads, or as .csv, its "
+                "samples alone: give one of these endings."
+            )
+
+    def _table(
+        self, names: Iterable[str] | None, points: Sequence[tuple[float, FloatArray, FloatArray]]
+    ) -> dict[str, FloatArray]:
+        # Parameters are told once, but for those that may change.
+        told = [v.name for v in self.automaton.variables if v.tunable or v.kind is not Kind.PARAMETER]
+        chosen = told if names is None else names
+        return {
+            name: np.array([self._read.value(name, *point) for point in points], dtype=np.float64).reshape(
+                len(points), *self.variable(name).shape
+            )
+            for name in chosen
+        }
+
+    def _require_inside(self, times: FloatArray) -> None:
+        # Written so that a time that is not a number is outside as well.
+        if times.size and not (times.min() >= self.t[0] and times.max() <= self.t[-1]):
+            raise DeclarationError(
+                f"a time in [{times.min():g}, {times.max():g}] s lies outside the run, "
+                f"which covers [{self.t[0]:g}, {self.t[-1]:g}] s."
+            )
+
+    def _flow_at(self, t: float, before: bool) -> FlowRecord:
+        at = bisect.bisect_left(self._ends, t) if before else bisect.bisect_right(self._starts, t) - 1
+        return self._flows[min(max(at, 0), len(self._flows) - 1)]
+
+    def _flow_on(self, t: float, j: Any) -> FlowRecord:
+        flow = self._flow_of(j)
+        if not flow.t0 <= t <= flow.t1:
+            raise DeclarationError(
+                f"hybrid time (t, j) = ({t:.9g} s, {j}) lies outside the run: at j = {j} it covers "
+                f"[{flow.t0:.9g}, {flow.t1:.9g}] s."
+            )
+        return flow
+
+    def _flow_of(self, j: Any) -> FlowRecord:
+        number = j - self._first_j
+        if not 0 <= number < len(self._flows) or number != int(number):
+            raise DeclarationError(f"the run has no jump count j = {j}: it covers {self.j[0]} to {self.j[-1]}.")
+        return self._flows[int(number)]
+
+
+def _times(given: npt.ArrayLike) -> FloatArray:
+    try:
+        return real_array(given)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DeclarationError(f"the times are {told(given)}: give numbers in s.") from error
+
+
+def _interval(what: str, given: Interval | None) -> Interval:
+    if given is None:
+        return -np.inf, np.inf
+    try:
+        a, b = (float(end) for end in given)
+    except (TypeError, ValueError) as error:
+        raise DeclarationError(
+            f"the interval {what} = {told(given)} has no two ends: write {what}=(first, last)."
+        ) from error
+    # Written so that an end that is not a number is refused as well.
+    if not a <= b:
+        raise DeclarationError(f"the interval {what} = ({given[0]}, {given[1]}) is empty: give its start first.")
+    return a, b

@@ -1,0 +1,226 @@
+"""From a point of a flow to the values of all variables: what an arc is read by.
+
+A flow carries a vector along. In a run it holds the continuous states, and inputs and outputs are computed from it. In
+an arc from a file it holds states, inputs and outputs one after the other, so nothing has to be computed. Everything
+else about arcs is the same for both.
+"""
+
+from __future__ import annotations
+
+import bisect
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.signals import Inputs
+from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, unknown_name
+from hybrid_model.errors import DeclarationError
+
+
+class ArcValues(ABC):
+    """Reads the variables of an automaton off the points of its flows.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        Whose variables.
+    """
+
+    def __init__(self, automaton: Automaton) -> None:
+        self.automaton = automaton
+        self.layout = Layout(automaton)
+        self._places = {place.variable.name: place for places in self.layout.places.values() for place in places}
+
+    @abstractmethod
+    def states(self, x: FloatArray) -> FloatArray:
+        """Return the continuous states in the vector that a flow carries."""
+
+    @abstractmethod
+    def parameters(self, t: float) -> FloatArray:
+        """Return the parameter vector at time `t` in s, continuous from the right."""
+
+    @abstractmethod
+    def parameter_steps(self, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+        """Return the times in [t0, t1] from which on the parameters are constant, t0 first, and their rows."""
+
+    @abstractmethod
+    def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return the input vector at a point of a flow."""
+
+    @abstractmethod
+    def outputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return the output vector at a point of a flow."""
+
+    def variable(self, name: str) -> Variable:
+        """Return a variable by name.
+
+        Raises
+        ------
+        DeclarationError
+            If there is none.
+        """
+        if name not in self._places:
+            known = {variable.name: variable for variable in self.automaton.variables}
+            whole = name.partition("[")[0] if isinstance(name, str) else name
+            if whole in self._places and whole != name:
+                raise DeclarationError(
+                    f"{name} is an element of {whole}: write arc[{whole!r}][:, i], counted from 0; names of elements "
+                    "are for plots and tables."
+                )
+            raise DeclarationError(unknown_name(self.automaton.name, name, known))
+        return self._places[name].variable
+
+    def interpolation_error(self, name: str) -> FloatArray:
+        """Return how far a value inside a step may lie from the dense output of the run."""
+        return np.zeros(self.variable(name).shape)
+
+    def values(self, t: float, x: FloatArray, z: FloatArray) -> Values:
+        """Return all values but the outputs, by name."""
+        return self.layout.values(t, self.states(x), z, self.inputs(t, x, z), self.parameters(t))
+
+    def value(self, name: str, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return one variable's value, of the variable's shape."""
+        kind = self.variable(name).kind
+        if kind is Kind.STATE:
+            vector = self.states(x)
+        elif kind is Kind.DISCRETE:
+            vector = z
+        elif kind is Kind.PARAMETER:
+            vector = self.parameters(t)
+        else:
+            vector = self.inputs(t, x, z) if kind is Kind.INPUT else self.outputs(t, x, z)
+        return np.asarray(self._places[name].take(vector), dtype=np.float64)
+
+    def channels(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return states, inputs and outputs in one vector."""
+        return np.concatenate([self.states(x), self.inputs(t, x, z), self.outputs(t, x, z)])
+
+
+class ComputedValues(ArcValues):
+    """Reads a run: inputs and parameters from their signals, outputs from the automaton.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        What ran.
+    signals : Inputs
+        Its inputs and parameters as functions of time.
+    """
+
+    def __init__(self, automaton: Automaton, signals: Inputs) -> None:
+        super().__init__(automaton)
+        self._signals = signals
+
+    def states(self, x: FloatArray) -> FloatArray:
+        """See `ArcValues.states`."""
+        return x
+
+    def parameters(self, t: float) -> FloatArray:
+        """See `ArcValues.parameters`."""
+        return self._signals.parameters_at(t)
+
+    def parameter_steps(self, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+        """See `ArcValues.parameter_steps`."""
+        return self._signals.parameter_steps(t0, t1)
+
+    def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.inputs`; continuous from the right."""
+        return self._signals.at(t)
+
+    def outputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.outputs`."""
+        if self.layout.sizes[Kind.OUTPUT] == 0:
+            return np.zeros(0)
+        return self.layout.pack(Kind.OUTPUT, self.automaton.output_values(self.values(t, x, z)))
+
+
+class ReceivedValues(ComputedValues):
+    """Reads the run of one part of a network, whose inputs are what it received.
+
+    Several receptions and jumps may fall on one instant, so the inputs depend on t and j: the flows carry j as one
+    more discrete state, the last.
+
+    Parameters
+    ----------
+    automaton, signals
+        As in `ComputedValues`; `signals` tells what the inputs from outside the network are.
+    received : sequence of (float, int, ndarray)
+        Hybrid time from which on, and the constants in the input vector; in order, the first at the start.
+    """
+
+    def __init__(
+        self,
+        automaton: Automaton,
+        signals: Inputs,
+        received: Sequence[tuple[float, int, FloatArray]],
+    ) -> None:
+        super().__init__(automaton, signals)
+        self._times = [(t, j) for t, j, _ in received]
+        self._held = [held for _, _, held in received]
+
+    def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.inputs`."""
+        last = bisect.bisect_right(self._times, (t, int(z[-1]))) - 1
+        return self._signals.with_held(self._held[max(last, 0)], t)
+
+
+class RecordedValues(ArcValues):
+    """Reads an arc whose flows carry states, inputs and outputs, see `ArcValues.channels`.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        Whose variables.
+    parameter_times : ndarray, shape (n,)
+        Times in s from which on the parameters are constant, ascending.
+    parameters : ndarray, shape (n, size)
+        The parameter vector from each of those times on.
+    errors : ndarray
+        Interpolation error of each channel.
+    """
+
+    def __init__(
+        self, automaton: Automaton, parameter_times: FloatArray, parameters: FloatArray, errors: FloatArray
+    ) -> None:
+        super().__init__(automaton)
+        self._parameter_times, self._parameters = parameter_times, parameters
+        self.errors = errors
+
+    def parameters(self, t: float) -> FloatArray:
+        """See `ArcValues.parameters`."""
+        row: FloatArray = self._parameters[max(int(np.searchsorted(self._parameter_times, t, side="right")) - 1, 0)]
+        return row
+
+    def parameter_steps(self, t0: float, t1: float) -> tuple[FloatArray, FloatArray]:
+        """See `ArcValues.parameter_steps`."""
+        later = self._parameter_times[(self._parameter_times > t0) & (self._parameter_times <= t1)]
+        times = np.concatenate([[t0], later])
+        return times, np.array([self.parameters(float(t)) for t in times])
+
+    def states(self, x: FloatArray) -> FloatArray:
+        """See `ArcValues.states`."""
+        return x[: self.layout.sizes[Kind.STATE]]
+
+    def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.inputs`."""
+        first = self.layout.sizes[Kind.STATE]
+        return x[first : first + self.layout.sizes[Kind.INPUT]]
+
+    def outputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.outputs`."""
+        return x[self.layout.sizes[Kind.STATE] + self.layout.sizes[Kind.INPUT] :]
+
+    def interpolation_error(self, name: str) -> FloatArray:
+        """See `ArcValues.interpolation_error`."""
+        vectors = {
+            Kind.STATE: self.states(self.errors),
+            Kind.INPUT: self.inputs(0.0, self.errors, np.zeros(0)),
+            Kind.OUTPUT: self.outputs(0.0, self.errors, np.zeros(0)),
+        }
+        kind = self.variable(name).kind
+        return (
+            np.array(self._places[name].take(vectors[kind])) if kind in vectors else super().interpolation_error(name)
+        )

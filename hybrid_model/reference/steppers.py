@@ -1,0 +1,216 @@
+"""The steps of a flow by SciPy's steppers, and what to do where a stepper cannot go on."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid_model.declare.layout import not_finite
+from hybrid_model.declare.variables import FloatArray, Kind
+from hybrid_model.errors import HybridModelError, SimulationError
+from hybrid_model.record.flow_piece import FlowPiece, straight_piece
+from hybrid_model.reference.borders import reach, step_from
+from hybrid_model.reference.locate import SMALLEST
+from hybrid_model.scales import ABSOLUTE, UNKNOWN, tolerance_sizes, ulp
+
+if TYPE_CHECKING:
+    from hybrid_model.reference.execution import Execution
+
+SHORTEST = 16.0
+"""Pieces shorter than this many ulp of t are made in one explicit Euler step: no stepper can subdivide them."""
+ATTEMPTS = 1000
+"""Evaluations, a state, after which a step that has met a derivative that is not finite is given up: a stepper that
+halves its step to nothing needs hundreds, and LSODA would try the same step for ever."""
+STATELESS_STEPS = 25
+"""Steps over a flow without continuous states, where no error estimate limits them."""
+PACE_STEPS = 2000
+"""So often the pace of a flow is looked at."""
+MOST_STEPS = 1e7
+"""A flow that would need more steps than this at its present pace is given up: no run lasts that long."""
+
+
+class StuckError(SimulationError):
+    """The flow map is not a number wherever the solver tries to go on."""
+
+
+class FlowMap:
+    """The derivative as steppers call it; it remembers values that are not finite.
+
+    A stepper may try a point outside the flow set and come back with a shorter step, so one such value is no error yet.
+    """
+
+    def __init__(self, execution: Execution, end: float) -> None:
+        self._execution = execution
+        # Inputs are continuous from the right: the last stage of a step that ends at a breakpoint belongs to the left.
+        self._last = float(np.nextafter(end, -np.inf)) if execution.inputs.vary else end
+        # This is the innermost loop of a run: what does not change along a flow is looked up once.
+        self._rates, self._z, self._p = execution.maps.rates, execution.z, execution.p
+        self._held = None if execution.inputs.vary else execution.inputs.at(execution.t)
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew: a step was accepted."""
+        self.trouble = ""
+        self._count = 0
+
+    def __call__(self, t: float, x: FloatArray) -> FloatArray:
+        """Return dx/dt; not a number where the map cannot be evaluated."""
+        execution = self._execution
+        t = min(t, self._last)
+        u = execution.inputs.at(t) if self._held is None else self._held
+        try:
+            rates = self._rates(t, x, self._z, u, self._p)
+        except HybridModelError:
+            raise
+        except (ArithmeticError, ValueError) as error:
+            # As `math.sqrt` of a negative number: what numpy's functions answer by a nan.
+            self.trouble = f"{type(error).__name__} ({error}) in the flow map at t = {t:.9g} s"
+            rates = np.full(x.shape, np.nan)
+        # A sum is finite if its terms are, but for an overflow.
+        if not self.trouble and not math.isfinite(rates.sum()) and not np.isfinite(rates).all():
+            self.trouble = f"derivative of {not_finite(execution.layout, Kind.STATE, rates)} at t = {t:.9g} s"
+        if self.trouble:
+            self._count += 1
+            if self._count > ATTEMPTS * (1 + rates.size):
+                raise SimulationError(_failure(execution, self, t, x, None))
+        return rates
+
+
+def steps(execution: Execution, end: float) -> Any:
+    """Yield the steps of the flow from the execution's state to `end`."""
+    options = execution.solver
+    if execution.x.size == 0:
+        yield from _stateless_steps(execution, end)
+        return
+    flow_map = FlowMap(execution, end)
+    # Not left to the steppers: with a first derivative that is not a number some of them never return.
+    flow_map(execution.t, execution.x)
+    if flow_map.trouble:
+        raise SimulationError(_failure(execution, flow_map, execution.t, execution.x, None))
+    if execution.t == execution.t_start or execution.sizes.max() == 0.0:
+        _raise_floor(execution, end)
+    first = min(execution.next_step or step_from(execution, end), options.max_step, end - execution.t)
+    stepper = _stepper(execution, flow_map, end, first)
+    pace = Pace(execution, end)
+    while stepper.status == "running":
+        t0, x0 = stepper.t, stepper.y
+        flow_map.forget()
+        try:
+            problem = stepper.step()
+        except HybridModelError:
+            raise
+        except ValueError as error:
+            # The linear algebra of the implicit methods refuses what is not finite.
+            first = 0.1 * getattr(stepper, "h_abs", 0.0)
+            if not first > SHORTEST * ulp(t0):
+                raise StuckError(_failure(execution, flow_map, t0, x0, str(error))) from error
+            stepper = _stepper(execution, flow_map, end, first)
+            continue
+        # LSODA calls a step done that went nowhere.
+        if stepper.status == "failed" or not stepper.t > t0:
+            if not flow_map.trouble and _raise_floor(execution, end):
+                stepper = _stepper(execution, flow_map, end, min(step_from(execution, end), options.max_step))
+                continue
+            kind = StuckError if flow_map.trouble else SimulationError
+            raise kind(_failure(execution, flow_map, t0, x0, problem or "the step length fell to zero"))
+        execution.next_step = getattr(stepper, "h_abs", None)
+        yield FlowPiece(t0, stepper.t, x0, stepper.y, stepper.dense_output())
+        stepper.atol = _absolute_tolerance(execution, 0.0)
+        pace.check(stepper.t)
+
+
+def _stepper(execution: Execution, flow_map: FlowMap, end: float, first: float) -> Any:
+    """Return SciPy's stepper at the execution's state."""
+    options = execution.solver
+    atol = _absolute_tolerance(execution, first * float(np.abs(flow_map(execution.t, execution.x)).max()))
+    return options.stepper(
+        flow_map,
+        execution.t,
+        execution.x,
+        end,
+        rtol=options.rtol,
+        atol=atol,
+        max_step=options.max_step,
+        first_step=first,
+    )
+
+
+def _raise_floor(execution: Execution, end: float) -> bool:
+    """Give states that are far below where the flow may lead a size of that; return whether they got one."""
+    found = reach(execution, end)
+    if not max(float(execution.sizes.max()), execution.floor) < UNKNOWN * found:
+        return False
+    execution.floor = found
+    return True
+
+
+def _absolute_tolerance(execution: Execution, first_reach: float) -> FloatArray:
+    """Return the absolute tolerance of each state: a part of its nominal value, else of its usual size.
+
+    `first_reach` is how far the first step leads: states that start at zero have no size yet.
+    """
+    if execution.solver.atol is not None:
+        return np.full(execution.x.shape, execution.solver.atol)
+    sizes = execution.sizes
+    if first_reach > sizes.max():
+        sizes = np.maximum(sizes, first_reach)
+    sizes = np.maximum(sizes, execution.floor)
+    usual = tolerance_sizes(np.maximum(sizes, SMALLEST / ABSOLUTE))
+    return ABSOLUTE * np.where(np.isnan(execution.nominal), usual, execution.nominal)
+
+
+class Pace:
+    """Gives up a flow that would take for ever: a stepper that creeps does not fail by itself."""
+
+    def __init__(self, execution: Execution, end: float) -> None:
+        self._execution, self._end = execution, end
+        self._t, self._steps = execution.t, 0
+
+    def check(self, t: float) -> None:
+        """Count a step that ends at `t` in s."""
+        self._steps += 1
+        if self._steps % PACE_STEPS:
+            return
+        needed = (self._end - t) / (t - self._t) * PACE_STEPS
+        if needed > MOST_STEPS:
+            execution = self._execution
+            state = execution.layout.describe({Kind.STATE: execution.x, Kind.DISCRETE: execution.z})
+            raise SimulationError(
+                f"{execution.automaton.name}: the flow creeps: its last {PACE_STEPS} steps led from t = {self._t:.9g} "
+                f"to {t:.9g} s ({state}), so that it would need {needed:.2g} more to reach {self._end:.9g} s. Look for "
+                "a flow map that is not smooth there (a root at zero, a sign): write it as modes with a switch, or "
+                "smooth it; for a stiff flow choose Radau or BDF, and looser tolerances."
+            )
+        self._t = t
+
+
+def _stateless_steps(execution: Execution, end: float) -> Any:
+    step = min(execution.solver.max_step, (end - execution.t) / STATELESS_STEPS)
+    times = np.linspace(execution.t, end, int(np.ceil((end - execution.t) / step)) + 1)
+    for t0, t1 in itertools.pairwise(times):
+        yield straight_piece(float(t0), float(t1), execution.x, execution.x)
+
+
+def _failure(execution: Execution, flow_map: FlowMap, t: float, x: FloatArray, problem: str | None) -> str:
+    why = (
+        f"no step meets the tolerances ({str(problem).rstrip('.')}); where the flow map jumps, let a jump or a time "
+        "event happen, and where an input jumps, give it as a Signal with its breakpoints"
+    )
+    if flow_map.trouble:
+        why = f"{flow_map.trouble}; the flow map must give finite numbers in the flow set"
+        if execution.automaton.has_flow_set or execution.guards:
+            why += ", and trial steps look a little outside: np.maximum(h, 0) under a root keeps it defined there"
+    state = execution.layout.describe({Kind.STATE: x, Kind.DISCRETE: execution.z})
+    return f"{execution.automaton.name}: the flow cannot go on at t = {t:.9g} s ({state}): {why}."
+
+
+def move(execution: Execution, piece: FlowPiece) -> FlowPiece:
+    """Bring an execution to the end of a piece, which must be finite."""
+    bad = not_finite(execution.layout, Kind.STATE, piece.x1)
+    if bad:
+        raise SimulationError(f"{execution.automaton.name}: {bad} at t = {piece.t1:.9g} s: states must stay finite.")
+    execution.arrive(piece.t1, piece.x1)
+    return piece

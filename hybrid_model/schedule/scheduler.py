@@ -1,0 +1,323 @@
+"""The scheduler of blocks that meet only at events: each is advanced only when something happens to it.
+
+Between two events a block's flow is its own, so the block itself predicts its next event (`nextEventTime` in FMI 3.0).
+The scheduler keeps those predictions in a queue, takes the earliest, lets that block jump, and brings only the
+receivers of what it sent to that instant. Nothing is rolled back, and an event costs as much as it has receivers,
+however many blocks there are. Blocks that cannot predict (they name no next event, or foresee only some of theirs) are
+stepped to the earliest prediction and may stop before it; only they are saved and restored.
+
+`hybrid_model.schedule.event_network` runs automata with it, `cosim.masters` FMUs and automata alike.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from hybrid_model.errors import SchedulingError
+from hybrid_model.scales import one_instant
+from hybrid_model.schedule.blocks import Block, Step, Termination
+
+ITERATIONS = 10_000
+"""Event iterations of one block at one instant, and steps of it in a row that lead nowhere, at most."""
+
+
+class Wire(Protocol):
+    """A scalar signal that leaves a block: its output, and the block and input that it goes to."""
+
+    @property
+    def output(self) -> str:
+        """Output of the block that it leaves."""
+
+    @property
+    def target(self) -> str:
+        """Name of the block that it goes to."""
+
+    @property
+    def input(self) -> str:
+        """Input of that block."""
+
+
+@dataclass(frozen=True)
+class Tick:
+    """A tick of an output clock: `slave`'s `clock` at `t` in s."""
+
+    t: float
+    slave: str
+    clock: str
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event of a block, at `t` in s."""
+
+    t: float
+    block: str
+
+
+@dataclass
+class _Place:
+    """A block and where it is."""
+
+    block: Block
+    order: int
+    t: float
+    t_event: float
+    next_event: float | None = None
+    version: int = 0
+    stalls: int = 0
+
+
+class Scheduler:
+    """The queue of predicted events, and the event iteration at one instant.
+
+    Parameters
+    ----------
+    blocks : mapping
+        Name -> block, in the order in which simultaneous events are handled; all of them in event mode.
+    wires_from : callable
+        Name of a block -> the wires that leave it. All carry signals that change only at events.
+    t_start : float
+        Time in s.
+    tolerance : float, optional
+        In s: events of different blocks closer than this are handled at one instant, in the order of the blocks;
+        default: as the run has it (`hybrid_model.scales`).
+
+    Attributes
+    ----------
+    t : float
+        Time in s up to which all events are handled.
+    ticks : list of Tick
+        Ticks of output clocks, in order.
+    events : list of Event
+        Instants at which blocks had events of their own, in order.
+    steps : int
+        Steps made by all blocks together.
+    ended : (str, float, Termination) or None
+        The block that ended the run, when, and why.
+    """
+
+    def __init__(
+        self,
+        blocks: Mapping[str, Block],
+        wires_from: Callable[[str], Iterable[Wire]],
+        t_start: float,
+        tolerance: float | None = None,
+    ) -> None:
+        self.t = self._t_start = t_start
+        self.ticks: list[Tick] = []
+        self.events: list[Event] = []
+        self.steps = 0
+        self.ended: tuple[str, float, Termination] | None = None
+        self._wires_from = wires_from
+        self._tolerance = tolerance
+        self._places = {name: _Place(block, k, t_start, t_start) for k, (name, block) in enumerate(blocks.items())}
+        self._unpredictable: set[str] = set()
+        self._queue: list[tuple[float, int, int, str]] = []
+
+    def advance_to(self, limit: float) -> None:
+        """Handle all events up to and including `limit` in s, then bring every block there.
+
+        Raises
+        ------
+        SchedulingError
+            If a block asks for event iterations without end, or its predictions contradict its steps.
+        """
+        while not self.ended:
+            t, due = self._next_instant(limit)
+            if not due:
+                break
+            self._note(t, due)
+            self.handle_events(t, due)
+        for name, place in self._places.items():
+            while not self.ended and place.t < limit:
+                if self._step(place, limit).event and not self.ended:
+                    self._require_announced(place, limit)
+                    place.block.enter_event_mode()
+                    self._note(limit, {name})
+                    self.handle_events(limit, {name})
+        if not self.ended:
+            self.t = limit
+
+    def handle_events(self, t: float, due: Collection[str]) -> None:
+        """Iterate the events of one instant: jumps in the order of the blocks, signals travelling at once (rule 6).
+
+        Parameters
+        ----------
+        t : float
+            The instant, in s.
+        due : collection of str
+            Blocks that are there, in event mode.
+        """
+        pending, touched = set(due), set(due)
+        iterations: dict[str, int] = {}
+        self.t = t
+        while pending and not self.ended:
+            name = min(pending, key=lambda n: self._places[n].order)
+            iterations[name] = iterations.get(name, 0) + 1
+            if iterations[name] > ITERATIONS:
+                raise SchedulingError(f"{name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s.")
+            update = self._places[name].block.update()
+            self.ticks += [Tick(t, name, clock) for clock in update.ticks]
+            if update.terminated:
+                self.ended = name, t, update.terminated
+                return
+            self._places[name].next_event = update.next_event
+            if not update.again:
+                pending.discard(name)
+            receivers = self._send(name, t, touched)
+            pending |= receivers
+            touched |= receivers
+        for name in touched:
+            self._leave_event_mode(name)
+
+    def _note(self, t: float, due: Collection[str]) -> None:
+        self.events += [Event(t, name) for name in sorted(due, key=lambda n: self._places[n].order)]
+
+    def _send(self, name: str, t: float, touched: set[str]) -> set[str]:
+        """Carry the outputs of a block to their receivers; return those for whom something changed."""
+        receivers: set[str] = set()
+        sender = self._places[name].block
+        for wire in self._wires_from(name):
+            value = sender.get(wire.output)
+            place = self._places[wire.target]
+            if place.block.get(wire.input) == value:
+                continue
+            if wire.target not in touched and wire.target not in receivers:
+                self._require_behind(place, t, name)
+                self._bring(place, t)
+            place.block.set(wire.input, value)
+            receivers.add(wire.target)
+        return receivers
+
+    def _bring(self, place: _Place, t: float) -> None:
+        """Bring a block that receives something to this instant, into event mode."""
+        if place.t < t:
+            self._step(place, t)
+            self._require_announced(place, t)
+        place.block.enter_event_mode()
+
+    def _require_behind(self, place: _Place, t: float, sender: str) -> None:
+        if place.t > t + self._instant(place, t):
+            raise SchedulingError(
+                f"{sender} sends to {place.block.name} at t = {t:.12g} s, but {place.block.name} is at "
+                f"{place.t:.12g} s already and cannot return to an earlier state: use the fixed-step master."
+            )
+
+    def _require_announced(self, place: _Place, t: float) -> None:
+        """Refuse a stop before `t`; at the same instant, it is rounding."""
+        if place.t < t - self._instant(place, t) and not self.ended:
+            raise SchedulingError(
+                f"{place.block.name} stopped at t = {place.t:.12g} s for an event that it had not announced, on the "
+                f"way to {t:.12g} s: its nextEventTime is wrong."
+            )
+
+    def _step(self, place: _Place, t: float) -> Step:
+        made = place.block.step(place.t, t)
+        self.steps += 1
+        if made.reached < place.t or made.reached > t + self._instant(place, t):
+            raise SchedulingError(
+                f"{place.block.name} stepped from {place.t:.12g} towards {t:.12g} s and says that it is at "
+                f"{made.reached:.12g} s: that is outside the step."
+            )
+        self._require_progress(place, made)
+        place.t = made.reached
+        if made.terminated:
+            self.ended = place.block.name, made.reached, made.terminated
+        return made
+
+    def _require_progress(self, place: _Place, made: Step) -> None:
+        """Refuse blocks that have one event after the other where they are."""
+        place.stalls = 0 if made.reached > place.t or made.terminated else place.stalls + 1
+        if place.stalls > ITERATIONS:
+            raise SchedulingError(
+                f"{place.block.name} gets no further than t = {place.t:.12g} s: each of its last {ITERATIONS} steps "
+                "ended there with an event."
+            )
+
+    def _leave_event_mode(self, name: str) -> None:
+        place = self._places[name]
+        place.block.enter_step_mode()
+        place.version += 1
+        place.t_event = place.t
+        predicts = place.next_event is not None and place.block.foresees
+        (self._unpredictable.discard if predicts else self._unpredictable.add)(name)
+        if place.next_event is None:
+            return
+        if place.next_event <= place.t:
+            raise SchedulingError(
+                f"{name} is at t = {place.t:.12g} s and says that its next event is at {place.next_event:.12g} s: that "
+                "is not ahead."
+            )
+        heapq.heappush(self._queue, (place.next_event, place.order, place.version, name))
+
+    def _next_instant(self, limit: float) -> tuple[float, set[str]]:
+        """Find the next instant with events up to `limit`, and bring the blocks concerned there."""
+        self._drop_obsolete()
+        first = min(self._queue[0][0] if self._queue else math.inf, limit)
+        stopped = self._watch_unpredictable(first)
+        if stopped:
+            first = min(place.t for place in stopped)
+        due = {place.block.name for place in stopped}
+        instant = first
+        while self._queue and self._queue[0][0] <= min(first + self._instant(self._first_place(), first), limit):
+            time, _, _, name = heapq.heappop(self._queue)
+            instant = max(instant, time)
+            due.add(name)
+            self._drop_obsolete()
+        for name in sorted(due, key=lambda n: self._places[n].order):
+            place = self._places[name]
+            # What has stopped for an event is there; FMI allows no step before it is handled.
+            if place.t < instant and place not in stopped and not self.ended:
+                self._step(place, instant)
+            if not self.ended:
+                place.block.enter_event_mode()
+        return instant, set() if self.ended else due
+
+    def _first_place(self) -> _Place:
+        return self._places[self._queue[0][3]]
+
+    def _instant(self, place: _Place, t: float) -> float:
+        """Return in s how far a block's event may be from `t` and still be of that instant (rule 6)."""
+        if self._tolerance is not None:
+            return self._tolerance
+        return one_instant(t, self._t_start, place.t_event)
+
+    def _drop_obsolete(self) -> None:
+        while self._queue and self._places[self._queue[0][3]].version != self._queue[0][2]:
+            heapq.heappop(self._queue)
+
+    def _watch_unpredictable(self, horizon: float) -> list[_Place]:
+        """Step the blocks that cannot predict to the horizon; return those that stopped at an event.
+
+        Each is stepped to the first stop of those before it. Those that are beyond the last one's return there; what
+        cannot return stays ahead, for as long as nobody sends anything to it.
+        """
+        watched = [self._places[name] for name in self._unpredictable if self._places[name].t < horizon]
+        watched.sort(key=lambda place: (not place.block.can_restore, place.order))
+        # Nobody can be behind the one that is stepped last.
+        saved = [(place, place.t, place.block.save()) for place in watched[:-1] if place.block.can_restore]
+        stopped: list[_Place] = []
+        first = horizon
+        try:
+            for place in watched:
+                if self._step(place, first).event:
+                    stopped.append(place)
+                    first = min(first, place.t)
+                if self.ended:
+                    return []
+            for place, t, state in saved:
+                if place.t > first + self._instant(place, first):
+                    place.block.restore(state)
+                    place.t = t
+                    self._step(place, first)
+        finally:
+            for place, _, state in saved:
+                place.block.release(state)
+        for place in stopped:
+            if place.t > first + self._instant(place, first) and not place.block.can_restore:
+                heapq.heappush(self._queue, (place.t, place.order, place.version, place.block.name))
+        return [place for place in stopped if place.t <= first + self._instant(place, first)]
