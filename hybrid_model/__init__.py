@@ -19,8 +19,9 @@ from hybrid_model.errors import (
 )
 from hybrid_model.record.arc import HybridArc
 from hybrid_model.record.arc_file import load_arc
+from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.samples import Samples
-from hybrid_model.reference.execution import Execution, JumpRecord
+from hybrid_model.reference.execution import Execution
 from hybrid_model.reference.zeno import ZenoGuard
 from hybrid_model.schedule.event_network import NetworkRun, simulate_network
 from hybrid_model.simulate import simulate

@@ -12,6 +12,7 @@ from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.signals import Inputs, InputValue
 from hybrid_model.errors import SimulationError
 from hybrid_model.record.arc import HybridArc
+from hybrid_model.record.arc_values import ComputedValues
 from hybrid_model.record.recording import Recording
 from hybrid_model.reference.execution import Execution
 from hybrid_model.reference.zeno import ZenoGuard
@@ -74,7 +75,7 @@ def simulate(
     execution = Execution(
         automaton, t_start=t_start, t_stop=t_end, inputs=Inputs(Layout(automaton), inputs), solver=solver, zeno=zeno
     )
-    recording = Recording(execution)
+    recording = Recording(execution.t, execution.j, execution.x, execution.z, execution.inputs.held)
     while execution.stopped is None:
         index = execution.due()
         if index is not None:
@@ -83,4 +84,11 @@ def simulate(
             execution.stopped, execution.message = Stop.HORIZON, f"{automaton.name}: reached t = {t_end:.9g} s."
         else:
             recording.flowed(execution.flow(t_end))
-    return HybridArc(execution, recording.flows, recording.jumps)
+    return HybridArc(
+        ComputedValues(automaton, execution.inputs),
+        recording.flows,
+        recording.jumps,
+        stop=execution.stopped,
+        message=execution.message,
+        event_tolerance=execution.event_tolerance,
+    )

@@ -17,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 
-from fmu.describe.events import after_jumps
-from fmu.describe.factors import Factor, factors
 from fmu.describe.variables import Bank, FmiType, FmuVariable
 from hybrid_model.declare.transitions import Priority, Trigger
 from hybrid_model.declare.variables import Kind
+from hybrid_model.native.event_dependencies import after_jumps
+from hybrid_model.native.factors import Factor, factors
 
 Matrix: TypeAlias = Any  # scipy.sparse.csr_array of int
 """Elements of a result by elements of all arguments side by side; `Factor` + 1 where one depends on the other."""

@@ -13,10 +13,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from hybrid_model import Automaton, Values
-from hybrid_model.declare.automaton import require_automaton
+from hybrid_model.declare.automaton import Automaton, require_automaton
 from hybrid_model.declare.transitions import Assignments
-from hybrid_model.declare.variables import FloatArray, Kind, Value
+from hybrid_model.declare.variables import FloatArray, Kind, Value, Values
 from hybrid_model.declare.vector_form import VectorForm
 from hybrid_model.native.trace import Trace, trace
 

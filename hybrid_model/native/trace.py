@@ -13,11 +13,11 @@ import casadi as ca
 import numpy as np
 from scipy import sparse
 
-from hybrid_model import Automaton, Values
+from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.real_numbers import told
 from hybrid_model.declare.transitions import Assignments, Trigger
-from hybrid_model.declare.variables import Kind, Variable
+from hybrid_model.declare.variables import Kind, Values, Variable
 from hybrid_model.errors import TraceError
 from hybrid_model.native.symbols import expressions, symbol_vector, symbols
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,19 +14,30 @@ from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.real_numbers import real_array, told
 from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, unknown_name
 from hybrid_model.errors import DataError, DeclarationError
-from hybrid_model.record.arc_values import ArcValues, ComputedValues
-from hybrid_model.record.flow_record import FlowRecord as FlowRecord
+from hybrid_model.record.arc_values import ArcValues
+from hybrid_model.record.flow_record import FlowRecord
+from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.samples import Samples
 from hybrid_model.stop import Stop
-
-if TYPE_CHECKING:
-    from hybrid_model.reference.execution import Execution, JumpRecord
 
 Interval = tuple[float, float]
 
 
 class HybridArc:
     """A run of an automaton: its samples on hybrid time, its jumps, and why it ended.
+
+    Parameters
+    ----------
+    read : ArcValues
+        Reads variables off the flows.
+    flows : sequence of FlowRecord
+        In order; one more than jumps.
+    jumps : sequence of JumpRecord
+        Jump k leads from flow k to flow k + 1.
+    stop, message, event_tolerance
+        See the attributes.
+    first_j : int
+        Jump count of the first flow.
 
     Attributes
     ----------
@@ -44,47 +55,12 @@ class HybridArc:
         What ran. That of a loaded arc has names, variables and jumps, but no maps.
     """
 
-    def __init__(self, execution: Execution, flows: Sequence[FlowRecord], jumps: list[JumpRecord]) -> None:
-        assert execution.stopped is not None
-        read = ComputedValues(execution.automaton, execution.inputs)
-        self._fill(read, flows, jumps, execution.stopped, execution.message, execution.event_tolerance)
-
-    @classmethod
-    def recorded(
-        cls,
-        read: ArcValues,
-        flows: Sequence[FlowRecord],
-        jumps: Sequence[JumpRecord],
-        *,
-        stop: Stop,
-        message: str,
-        event_tolerance: float,
-        first_j: int = 0,
-    ) -> HybridArc:
-        """Make an arc from flows that are there already, such as those of a file.
-
-        Parameters
-        ----------
-        read : ArcValues
-            Reads variables off the flows.
-        flows : sequence of FlowRecord
-            In order; one more than jumps.
-        jumps : sequence of JumpRecord
-            Jump k leads from flow k to flow k + 1.
-        stop, message, event_tolerance
-            See `HybridArc`.
-        first_j : int
-            Jump count of the first flow.
-        """
-        arc = object.__new__(cls)
-        arc._fill(read, flows, jumps, stop, message, event_tolerance, first_j)
-        return arc
-
-    def _fill(
+    def __init__(
         self,
         read: ArcValues,
         flows: Sequence[FlowRecord],
         jumps: Sequence[JumpRecord],
+        *,
         stop: Stop,
         message: str,
         event_tolerance: float,
@@ -206,7 +182,7 @@ class HybridArc:
                 f"nothing of the run lies in t = [{a:g}, {b:g}] s and j = [{first:g}, {last:g}]: it covers "
                 f"t = [{self.t[0]:g}, {self.t[-1]:g}] s and j = [{self.j[0]}, {self.j[-1]}]."
             )
-        return HybridArc.recorded(
+        return HybridArc(
             self._read,
             [self._flows[k].cut(a, b) for k in kept],
             self.jumps[kept[0] : kept[-1]],

@@ -25,8 +25,8 @@ from hybrid_model.record.arc_values import ArcValues, RecordedValues
 from hybrid_model.record.flow_piece import FlowPiece
 from hybrid_model.record.flow_record import FlowRecord
 from hybrid_model.record.interpolants import Interpolant, Polynomial, interpolate
+from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.kept_automaton import RecordedAutomaton
-from hybrid_model.reference.execution import JumpRecord
 from hybrid_model.stop import Stop
 
 SCHEMA = "hybrid-fmu hybrid arc"
@@ -225,7 +225,7 @@ def _arc(content: Table) -> HybridArc:
         JumpRecord(float(t), first + k, int(index), automaton.jumps[index].name, *row)
         for k, (t, index, *row) in enumerate(zip(content["jump_t"], content["jump_index"], *sides, strict=True))
     ]
-    return HybridArc.recorded(
+    return HybridArc(
         read,
         flows,
         jumps,

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.record.flow_piece import FlowPiece
 from hybrid_model.record.flow_record import FlowRecord
-
-if TYPE_CHECKING:
-    from hybrid_model.reference.execution import Execution, JumpRecord
+from hybrid_model.record.jump_record import JumpRecord
 
 
 class Recording:
@@ -18,8 +15,12 @@ class Recording:
 
     Parameters
     ----------
-    execution : Execution
-        At its start.
+    t, j : float, int
+        Hybrid time of the start.
+    x, z : ndarray
+        Continuous and discrete states there.
+    held : ndarray
+        The constants in the inputs.
     keep : bool
         Whether to keep anything at all.
 
@@ -31,13 +32,13 @@ class Recording:
         Hybrid time from which on, and the constants in the inputs.
     """
 
-    def __init__(self, execution: Execution, *, keep: bool = True) -> None:
+    def __init__(self, t: float, j: int, x: FloatArray, z: FloatArray, held: FloatArray, *, keep: bool = True) -> None:
         self._keep = keep
         self.jumps: list[JumpRecord] = []
         self._closed: list[FlowRecord] = []
-        self._open = FlowRecord(execution.t, execution.x, execution.z, ())
+        self._open = FlowRecord(t, x, z, ())
         self._pieces: list[FlowPiece] = []
-        self.received = [(execution.t, execution.j, execution.inputs.held)]
+        self.received = [(t, j, held)]
 
     def flowed(self, pieces: Sequence[FlowPiece]) -> None:
         """Note steps of the present flow."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from hybrid_model.declare.transitions import Priority, Trigger
 from hybrid_model.declare.variables import FloatArray, Kind, Values
 from hybrid_model.errors import SimulationError
 from hybrid_model.record.flow_piece import FlowPiece, straight_piece
+from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.reference.borders import border, leads_out
 from hybrid_model.reference.flow import integrate
 from hybrid_model.reference.zeno import ZenoGuard, ZenoMonitor
@@ -28,34 +28,6 @@ from hybrid_model.stop import Stop
 
 _QUIET = np.errstate(all="ignore")
 """Values that are not finite are found and named by the checks of rule 10, not by numpy's warnings."""
-
-
-@dataclass(frozen=True, eq=False)
-class JumpRecord:
-    """One jump of a run.
-
-    Attributes
-    ----------
-    t : float
-        Time in s.
-    j : int
-        Jump count before the jump.
-    index : int
-        Number of the jump among the automaton's jumps.
-    name : str
-        Its name.
-    x_before, z_before, x_after, z_after : ndarray
-        Continuous and discrete states on both sides.
-    """
-
-    t: float
-    j: int
-    index: int
-    name: str
-    x_before: FloatArray
-    z_before: FloatArray
-    x_after: FloatArray
-    z_after: FloatArray
 
 
 class Execution:

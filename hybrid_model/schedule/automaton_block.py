@@ -52,7 +52,7 @@ class AutomatonBlock(Block):
     ) -> None:
         self.name = name
         self.run = run
-        self.recording = Recording(run, keep=keep)
+        self.recording = Recording(run.t, run.j, run.x, run.z, run.inputs.held, keep=keep)
         self._t_stop, self._predictable, self._events = t_stop, predictable, events
         self._ahead: Lookahead | None = None
         self._places = {element: (kind, k) for kind in Kind for k, element in enumerate(run.layout.names(kind))}

@@ -23,7 +23,8 @@ from hybrid_model.declare.variables import FloatArray, Kind, Values, element_nam
 from hybrid_model.errors import SimulationError, WiringError
 from hybrid_model.record.arc import HybridArc
 from hybrid_model.record.arc_values import ReceivedValues
-from hybrid_model.reference.execution import Execution, JumpRecord
+from hybrid_model.record.jump_record import JumpRecord
+from hybrid_model.reference.execution import Execution
 from hybrid_model.reference.zeno import ZenoGuard
 from hybrid_model.schedule.automaton_block import AutomatonBlock
 from hybrid_model.schedule.scheduler import Scheduler
@@ -196,7 +197,7 @@ def _result(
         run, recording = block.run, block.recording
         read = ReceivedValues(run.automaton, run.inputs, recording.received)
         flows = [replace(flow, z=np.append(flow.z, j)) for j, flow in enumerate(recording.flows)]
-        arcs[part] = HybridArc.recorded(
+        arcs[part] = HybridArc(
             read,
             flows,
             recording.jumps,

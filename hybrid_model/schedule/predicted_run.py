@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, replace
 
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.record.flow_piece import FlowPiece
+from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.recording import Recording
-from hybrid_model.reference.execution import Execution, JumpRecord
+from hybrid_model.reference.execution import Execution
 
 PIECES = 8
 """Solver steps of one look-ahead: what lies beyond is looked at when the time comes, for an input may change before."""

@@ -280,9 +280,9 @@ for fmi in ("2.0", "3.0"):
 
 
 def test_the_locale_of_the_exporter_changes_no_byte(german, tmp_path):
-    tests = str(Path(__file__).parents[1])
+    support = str(Path(__file__).parents[1] / "support")
     for locale in ("C", "de_DE.UTF-8"):
-        command = [sys.executable, "-c", EXPORT, tests, str(tmp_path / locale), locale]
+        command = [sys.executable, "-c", EXPORT, support, str(tmp_path / locale), locale]
         subprocess.run(command, check=True, env=os.environ | german, cwd=tmp_path)
     for fmi in VERSIONS:
         plain, other = (tmp_path / f"{locale}-{fmi}.fmu" for locale in ("C", "de_DE.UTF-8"))

@@ -87,7 +87,8 @@ class Trigger:
         The law. STATIC: ``|e| >= threshold``; DYNAMIC: ``|e| >= threshold exp(-decay t)`` (paper, section 4); MIXED:
         ``|e| >= offset + threshold exp(-decay t)``; RELATIVE and GIRARD: see
         `hybrid_model.consensus.laws.relative_triggers`; SELF_TRIGGERED: as DYNAMIC, the event time computed ahead;
-        SAMPLED: as DYNAMIC, looked at every `period`; PERIODIC: a broadcast every `period`; CONTINUOUS: no error at all.
+        SAMPLED: as DYNAMIC, looked at every `period`; PERIODIC: a broadcast every `period`; CONTINUOUS: no error at
+        all.
     threshold : float
         c > 0 (of MIXED c1), in the unit of the states.
     decay : float

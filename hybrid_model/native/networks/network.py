@@ -12,7 +12,8 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hybrid_model import Automaton, Composition
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.variables import Kind
 from hybrid_model.native.networks.code import NetworkCode

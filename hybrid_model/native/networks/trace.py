@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from hybrid_model import Automaton, Composition
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import Kind

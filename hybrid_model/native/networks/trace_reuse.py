@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid_model import Automaton
+from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.variables import Variable
 
 _MESSAGES = frozenset(f"hybrid_model.{module}" for module in ("automaton", "compose", "layout")) | {

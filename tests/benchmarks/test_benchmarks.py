@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from benchmarks import step_cost
 from benchmarks.contenders import CONTENDERS
 from benchmarks.measure import Entry, choose, fastest_scipy, score
 from benchmarks.problems import MIRRORED, PAPER_DYNAMIC, PROBLEMS, Ball, Outcome
-
 from hybrid_model.models import BouncingBall
 
 SHORT_PAPER = replace(PAPER_DYNAMIC, scenario=replace(PAPER_DYNAMIC.scenario, stop_time=8.0))

@@ -16,7 +16,7 @@ from hybrid_model.consensus.runs.savings import Measure, run_savings
 from hybrid_model.consensus.scenario.scenario_file import load_scenario
 from hybrid_model.native.compiled import compiled
 
-PAGE = (Path(__file__).parents[2] / "docs" / "savings.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[3] / "docs" / "savings.md").read_text(encoding="utf-8")
 ROWS = {
     "integral of `d^2`": Measure.INTEGRAL,
     "largest `d` in the last quarter": Measure.ULTIMATE,

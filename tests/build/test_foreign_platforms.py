@@ -25,7 +25,7 @@ pytestmark = [
     pytest.mark.skipif(find_spec("ziglang") is None, reason="the package ziglang is not installed"),
     pytest.mark.skipif(this_platform().name != "x86_64-linux", reason="emulators of other platforms are for this one"),
 ]
-DRIVER = Path(__file__).with_name("foreign_run.c")
+DRIVER = Path(__file__).parents[1] / "support" / "foreign_run.c"
 MODELS = ("bouncing_ball", "newtons_cradle", "agent2_dynamic", "paper_dynamic", "event_triggered_lti_loop")
 STOP, STEP = 2.0, 0.05
 # Time and states are of the order of 1; an event's time is known to some roundings of the margin over its slope.

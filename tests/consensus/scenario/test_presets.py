@@ -21,7 +21,7 @@ from hybrid_model.consensus.scenario.scenario_file import load_scenario, preset_
 from hybrid_model.consensus.weights.gated_sine import WeightMap
 from hybrid_model.native.compiled import compiled
 
-DOCS = Path(__file__).parents[2] / "docs"
+DOCS = Path(__file__).parents[3] / "docs"
 PAGE = (DOCS / "presets.md").read_text(encoding="utf-8")
 VARIANTS = [name for name in preset_names() if name.startswith("paper-")]
 

@@ -15,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from witnesses import Mix, Ramps
 
-TESTS = str(Path(__file__).parents[1])
+SUPPORT = str(Path(__file__).parents[1] / "support")
 HEADER, CHECKSUM = 64, slice(24, 32)
 POINTS = [0.31, 0.52, 0.97]
 STARTS = {"limit_a": 0.3, "rate_b": 2.0, "limit_b": 1.1, "first": 0.45, "period": 0.2}
@@ -71,7 +71,7 @@ def test_another_instance_continues_bit_for_bit(label, binaries):
 CHILD = f"""
 import hashlib, sys
 from pathlib import Path
-sys.path.insert(0, {TESTS!r})
+sys.path.insert(0, {SUPPORT!r})
 from fmu_driver2 import OK, Binary
 from fmu_driver_journey import Journey, instance
 path, label, fmi, task, file = sys.argv[1:]
@@ -187,7 +187,7 @@ def test_random_damage_is_refused(at, byte, tail, binaries):
 FORGED = """
 import random, struct, sys
 from pathlib import Path
-sys.path.insert(0, {tests!r})
+sys.path.insert(0, {support!r})
 from fmu_driver2 import OK, Binary
 from fmu_driver_journey import Journey, instance
 path, label, fmi, seed = sys.argv[1:]
@@ -249,7 +249,7 @@ MANY = {label: 2000 if setting["kind"] == "me" else 150 for label, setting in SE
 def test_forged_bytes_with_a_right_checksum_do_no_harm(label, rounds, paths):
     """Whoever can compute the checksum can put in anything: no crash, no hang, and a reset heals all."""
     fmi = SETTINGS[label]["fmi"]
-    script = FORGED.format(tests=TESTS, rounds=rounds)
+    script = FORGED.format(support=SUPPORT, rounds=rounds)
     command = [sys.executable, "-c", script, str(paths["mix", fmi]), label, fmi, str(rounds)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60 + rounds)
     assert done.returncode == 0, done.stderr[-2000:]

@@ -22,7 +22,7 @@ from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.scenario_file import load_scenario
 from hybrid_model.native.compiled import compiled
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "paper-audit.md"
 STAR, PATH = ((1, 2), (1, 3), (1, 4)), ((1, 2), (2, 3), (3, 4))
 

@@ -18,7 +18,7 @@ from witnesses import Mix, Ramps
 import hybrid_model as hm
 from hybrid_model.models import BouncingBall, Thermostat
 
-TESTS = str(Path(__file__).parents[1])
+SUPPORT = str(Path(__file__).parents[1] / "support")
 POINTS = [0.0, 0.2, 0.45, 0.7, 1.0]
 STARTS = {"limit_a": 0.3, "rate_b": 2.0, "limit_b": 1.1, "first": 0.45, "period": 0.2}
 MODES = ("instantiated", "initialization", "event", "step", "terminated")
@@ -426,7 +426,7 @@ BAD_STEPS = [
 ]
 REFUSALS = f"""
 import math, sys
-sys.path.insert(0, {TESTS!r})
+sys.path.insert(0, {SUPPORT!r})
 from math import inf, nan
 from fmu_driver import Instance, Library, advance
 library = Library(sys.argv[1])
@@ -479,7 +479,7 @@ def test_a_step_without_end_ends(exported):
     """No stop time, a model that never rests and a step of 1e9 s: the FMU gives up in bounded time and says so."""
     code = f"""
 import sys
-sys.path.insert(0, {TESTS!r})
+sys.path.insert(0, {SUPPORT!r})
 from fmu_driver import Instance, Library
 instance = Instance(Library(sys.argv[1]), events=False, early=False)
 instance.initialize()
@@ -526,7 +526,7 @@ def test_steps_of_almost_nothing_are_steps(h, library):
 
 LEAKS = f"""
 import os, sys
-sys.path.insert(0, {TESTS!r})
+sys.path.insert(0, {SUPPORT!r})
 from fmu_driver import Instance, Library, advance
 from pathlib import Path
 

@@ -12,7 +12,7 @@ from nbclient import NotebookClient
 
 import hybrid_model as hm
 
-FOLDER = Path(__file__).parents[1] / "notebooks"
+FOLDER = Path(__file__).parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 KERNEL = "this-interpreter"
 # A cell takes seconds; a busy machine may take many times that, a hanging FMU for ever.

@@ -12,7 +12,7 @@ from catalogue import cases
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from semantics.small_automata import Corridor, PatientCorridor, Timer
+from small_automata import Corridor, PatientCorridor, Timer
 from test_agreement import python_run
 
 import hybrid_model as hm
