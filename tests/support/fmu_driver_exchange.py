@@ -27,7 +27,7 @@ class Exchange:
     component : fmu_driver2.Component
         Made for Model Exchange.
     short : float
-        Stops so much before each state event, s.
+        Stops so much before each state event, as a part of the time of the run.
     watch : bool
         Look at the event indicators; otherwise only at what fmi*CompletedIntegratorStep says.
     by_name : bool
@@ -83,7 +83,7 @@ class Exchange:
                 late = middle
             else:
                 early = middle
-        late = max(late - self.short, self.t)
+        late = max(late * (1 - self.short), self.t)
         return late, self.reach(x, k1, late - self.t)
 
     def run(self, points, update, changes=()):
