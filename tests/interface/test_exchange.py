@@ -100,17 +100,17 @@ def test_a_state_set_by_name_is_not_taken_for_one_that_has_reached_a_guard(fmi, 
     component = make("ramps", fmi)
     component.begin(limit_a=0.3)
     component.do("SetTime", c.c_double(0.1))
-    component.set("a", 0.3 - 5e-10)
+    component.set("a", 0.3 - 5e-11)
     component.do("EnterEventMode")
     component.do("EnterContinuousTimeMode")
     assert component.completed() == (OK, True, False)
-    component.set("a", 0.3 - 4e-10)
+    component.set("a", 0.3 - 4e-11)
     assert component.completed() == (OK, False, False)
     component.free()
 
 
 @VERSIONS
-@pytest.mark.parametrize(("ahead", "n"), [(1e-6, 0), (1e-8, 0), (5e-10, 1), (1e-15, 1)])
+@pytest.mark.parametrize(("ahead", "n"), [(1e-6, 0), (1e-8, 0), (2e-10, 1), (1e-15, 1)])
 def test_where_flow_has_priority_a_border_of_both_sets_is_reached_a_little_before_it(fmi, ahead, n, make):
     component = make("patient", fmi)
     component.begin()
@@ -127,7 +127,7 @@ def test_where_flow_has_priority_a_border_of_both_sets_is_reached_a_little_befor
 def test_an_importer_that_stops_far_before_a_guard_finds_nothing_there(fmi, make):
     component = make("ramps", fmi)
     component.begin(limit_a=0.3)
-    for ahead, n in ((1e-6, 0), (1e-8, 0), (5e-10, 1)):
+    for ahead, n in ((1e-6, 0), (1e-8, 0), (2e-10, 1)):
         component.do("SetTime", c.c_double(0.3 - ahead))
         component.do("SetContinuousStates", doubles([0.3 - ahead, 0.1]), c.c_size_t(2))
         component.do("EnterEventMode")
