@@ -1,4 +1,4 @@
-"""The house: rooms that are not crowded, that say what they are for, and contracts that notice an arrow turned round."""
+"""The house: rooms that are not crowded and say what they are for; contracts that notice an arrow turned round."""
 
 import ast
 import re
