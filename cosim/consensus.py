@@ -13,7 +13,7 @@ from cosim.result import CosimResult
 from cosim.system import System
 from hybrid_model.consensus.laws.closed_loop import agent_name, broadcast_wires, scenario_agents
 from hybrid_model.consensus.runs.report import RunReport, edge_norm
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 
 CLOCK = "broadcast_clock"
 

@@ -14,7 +14,7 @@ from hybrid_model.consensus.certificates.bound_table import Certified
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.figures.certificates import save_certificate_figures
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.native.compiled import compiled
 
 SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-audit.md of this project"

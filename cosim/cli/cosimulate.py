@@ -21,8 +21,8 @@ from fmu.export import export_fmu
 from fmu.importer.folders import temporary_folder
 from fmu.importer.values import shown
 from hybrid_model.consensus.laws.closed_loop import scenario_agents
-from hybrid_model.consensus.scenario.scenario_data import Scenario
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 
 MOST_SHOWN = 8
 """Most times of events of one slave that are printed."""

@@ -26,7 +26,7 @@ from fmu.errors import ExportError
 from fmu.export import export_fmu
 from hybrid_model import Automaton
 from hybrid_model.consensus.laws.closed_loop import scenario_agents
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.declare.automaton import require_made
 
 KINDS = ("cs", "me")

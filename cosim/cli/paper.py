@@ -23,8 +23,8 @@ from hybrid_model.consensus.certificates.rates import BoundForm, ConvergenceBoun
 from hybrid_model.consensus.figures.run import save_paper_figures
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop, scenario_agents
 from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
-from hybrid_model.consensus.scenario.scenario_data import Scenario, replace_trigger
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.declare.variables import FloatArray
 
 PRESET = "paper-a"

@@ -17,8 +17,8 @@ from cosim.masters import run_event_exact
 from cosim.masters.start import require_times
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
 from hybrid_model.consensus.runs.report import RunReport, run_report
-from hybrid_model.consensus.scenario.scenario_data import Scenario
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 
 AUTOMATON_AGENTS = 8
 """Up to this many agents `auto` runs the closed loop as one automaton; beyond, event by event over the network."""

@@ -30,27 +30,23 @@ from hybrid_model.consensus.graphs.generators import (
     star_graph,
 )
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
-from hybrid_model.consensus.laws.agents import (
-    DynamicTrigger,
-    EventGenerator,
-    Integrator,
-    MixedTrigger,
-    StaticTrigger,
-    agent,
-)
+from hybrid_model.consensus.laws.agents import Integrator, agent
 from hybrid_model.consensus.laws.closed_loop import broadcast_wires, closed_loop, scenario_agents
 from hybrid_model.consensus.laws.double_integrators import (
     double_integrator_agents,
     double_integrator_loop,
     double_integrator_wires,
 )
+from hybrid_model.consensus.laws.triggers import DynamicTrigger, EventGenerator, MixedTrigger, StaticTrigger
 from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop, vector_wires
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.runs.metrics import communication, gap_statistics, performance, run_metrics
 from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
 from hybrid_model.consensus.runs.savings import Savings, run_savings
-from hybrid_model.consensus.scenario.scenario_data import Channel, Scenario, Trigger, TriggerKind, replace_trigger
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, preset_names, read_scenario
+from hybrid_model.consensus.scenario.channel import Channel
+from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
+from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.automata import (
     ConstantWeights,
     GatedAbsoluteSineWeights,

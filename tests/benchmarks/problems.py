@@ -10,7 +10,8 @@ import numpy as np
 from oracles.exact_consensus import exact_run
 
 from hybrid_model.consensus.graphs.undirected import incidence
-from hybrid_model.consensus.scenario.scenario_file import Scenario, load_scenario, read_scenario
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from fmpy.fmi3 import FMU3Slave
 import hybrid_model as hm
 from fmu.export import export_fmu
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.native.compiled import compiled
 from hybrid_model.native.networks.network import worth_looping
 

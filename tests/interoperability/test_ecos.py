@@ -16,7 +16,7 @@ import hybrid_model as hm
 from cosim.consensus import fmu_system
 from cosim.masters.fixed_step import run_fixed_step
 from hybrid_model.consensus.laws.closed_loop import broadcast_wires, scenario_agents
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.models import BouncingBall
 
 # The wheel does not say that it needs oneTBB: the package tbb puts it beside the interpreter, where nobody looks.

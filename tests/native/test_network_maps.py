@@ -11,7 +11,7 @@ from catalogue import cases
 import hybrid_model as hm
 from fmu.build.binaries import GENERATED_FLAGS, OWN_FOLDERS, STRICT_FLAGS, find_compiler, own_files
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import Kind
 from hybrid_model.models import BouncingBall

@@ -17,8 +17,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid_model.consensus.scenario.scenario_file import NoSwitching, Scenario, TriggerKind
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 from hybrid_model.consensus.weights.gated_sine import ConstantWeight, WeightMap
+from hybrid_model.consensus.weights.switching import NoSwitching
 
 EPS = np.finfo(float).eps
 THRESHOLDS = (TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.MIXED, TriggerKind.SELF_TRIGGERED)

@@ -15,7 +15,7 @@ from itertools import count, pairwise
 import numpy as np
 from scipy.optimize import brentq
 
-from hybrid_model.consensus.scenario.scenario_file import TriggerKind
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 from oracles.exact_consensus import WeightsOnPiece, cut_times
 
 POINTS = 300

@@ -7,7 +7,7 @@ Sampled checks have a loop of their own: at each check the errors are compared w
 
 import numpy as np
 
-from hybrid_model.consensus.scenario.trigger_data import TriggerKind
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 from hybrid_model.consensus.weights.carriers import RippleCarrier, SineCarrier, UnitCarrier, WeightMap
 from oracles.exact_consensus import ClosedLoop
 

@@ -9,10 +9,10 @@ from catalogue_weights import weights_cases
 
 import hybrid_model as hm
 import hybrid_model.models
-from hybrid_model.consensus.laws import agents
+from hybrid_model import consensus
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, replace_trigger
-from hybrid_model.consensus.weights import automata as edges
+from hybrid_model.consensus.scenario.definition import replace_trigger
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.linear import lti
 
 
@@ -36,19 +36,19 @@ def cases():
         # Not stiff: the FMU integrates with an explicit method.
         "stiff_thermostat": Case(hm.models.StiffThermostat(sensor_lag=0.5), 40.0),
         "integrator": Case(
-            agents.Integrator(degree=2, x=1.0, weights=[1.0, 0.5]),
+            consensus.Integrator(degree=2, x=1.0, weights=[1.0, 0.5]),
             4.0,
             {"broadcast": ((1.0, 2.0), (2.5, -1.0)), "neighbours[2]": ((2.0, 0.5),)},
         ),
-        "static_trigger": Case(agents.StaticTrigger(x=1.0), 4.0, {"x": ((1.0, 1.2), (2.0, 1.7), (3.0, -4.0))}),
+        "static_trigger": Case(consensus.StaticTrigger(x=1.0), 4.0, {"x": ((1.0, 1.2), (2.0, 1.7), (3.0, -4.0))}),
         "dynamic_trigger": Case(
-            agents.DynamicTrigger(x=1.0, decay=0.5), 6.0, {"x": ((1.0, 1.2), (2.0, 1.4), (3.0, 1.3))}
+            consensus.DynamicTrigger(x=1.0, decay=0.5), 6.0, {"x": ((1.0, 1.2), (2.0, 1.4), (3.0, 1.3))}
         ),
-        "constant_weights": Case(edges.ConstantWeights(value=[1.0, 2.0]), 1.0),
-        "gated_sine": Case(edges.GatedSineWeights(duty_percent=[20.0, 35.0]), 5.0),
-        "gated_absolute_sine": Case(edges.GatedAbsoluteSineWeights(duty_percent=[60.0, 100.0], phase=0.3), 5.0),
+        "constant_weights": Case(consensus.ConstantWeights(value=[1.0, 2.0]), 1.0),
+        "gated_sine": Case(consensus.GatedSineWeights(duty_percent=[20.0, 35.0]), 5.0),
+        "gated_absolute_sine": Case(consensus.GatedAbsoluteSineWeights(duty_percent=[60.0, 100.0], phase=0.3), 5.0),
         "switching": Case(
-            edges.PeriodicSwitching(dwell=0.7, active=[[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], raw=[2.0, 3.0]), 5.0
+            consensus.PeriodicSwitching(dwell=0.7, active=[[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], raw=[2.0, 3.0]), 5.0
         ),
     }
     found |= process_cases()
@@ -134,7 +134,7 @@ def control_plant_under_triggers():
     parts = {"plant": lti(plant, start=[0.8, -0.3]), "gain": lti(gain)}
     wires = {"plant.u": "gain.u"}
     for sensor in ("position", "velocity"):
-        parts[sensor] = agents.StaticTrigger(threshold=0.02)
+        parts[sensor] = consensus.StaticTrigger(threshold=0.02)
         wires |= {f"{sensor}.x": f"plant.{sensor}", f"gain.{sensor}": f"{sensor}.broadcast"}
     return hm.Composition("control_plant_under_triggers", parts, wires)
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
 from hybrid_model.consensus.laws.double_integrators import double_integrator_agents, double_integrator_loop
 from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop
-from hybrid_model.consensus.scenario.scenario_data import Channel, Trigger, TriggerKind
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.channel import Channel
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.gated_sine import WeightMap
 
 LAWS = {

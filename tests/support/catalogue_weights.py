@@ -2,10 +2,10 @@
 
 import numpy as np
 
+from hybrid_model import consensus
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
-from hybrid_model.consensus.scenario.scenario_data import Scenario, Weights
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
-from hybrid_model.consensus.weights import automata as edges
+from hybrid_model.consensus.scenario.definition import Scenario, Weights
+from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.consensus.weights.blocks import switching_block, weights_block
 from hybrid_model.consensus.weights.functions import distance_weights
 from hybrid_model.consensus.weights.random_switching import markov_sequence
@@ -63,8 +63,8 @@ def weights_cases(make_case):
     shorter = SampledWeight((0.0, 0.8, 1.2), (0.5, 1.5, 0.2), repeat=True)
     steps = PiecewiseWeight((0.1, 0.7, 1.5), (1.0, 0.0, 2.0), cycle=1.8)
     found = {
-        "square_weights": make_case(edges.SquareWeights(high=[2.0, 1.0], low=0.3, duty_percent=[35.0, 100.0]), 5.0),
-        "sine_weights": make_case(edges.SineWeights(mean=[1.0, 2.0], depth=[0.5, 1.0], rate=[2.0, 3.0]), 5.0),
+        "square_weights": make_case(consensus.SquareWeights(high=[2.0, 1.0], low=0.3, duty_percent=[35.0, 100.0]), 5.0),
+        "sine_weights": make_case(consensus.SineWeights(mean=[1.0, 2.0], depth=[0.5, 1.0], rate=[2.0, 3.0]), 5.0),
         "sampled_weights": make_case(weights_block([drifting, SampledWeight((0.0, 3.0, 6.0), (1.0, 0.0, 4.0))]), 5.0),
         "tables_of_two_periods": make_case(weights_block([shorter, steps]), 11.0),
         "tabulated_weights": make_case(

@@ -15,7 +15,7 @@ from hybrid_model.consensus.graphs.generators import (
     small_world_graph,
     star_graph,
 )
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.scenario.files import read_scenario
 
 WEIGHTS = ("constant", "gated-sine", "sine", "square", "piecewise", "sampled")
 GRAPHS = ("path", "ring", "star", "complete", "regular", "erdos-renyi", "geometric", "small-world")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.scenario.files import read_scenario
 
 TRIGGERS = {
     "static": lambda rng: {"threshold": rng.uniform(0.05, 0.4)},

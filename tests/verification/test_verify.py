@@ -18,7 +18,7 @@ from test_agreement import python_run
 import hybrid_model as hm
 from cosim.cli.main import main
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import Kind

@@ -22,7 +22,7 @@ from hybrid_model.consensus.exact.worst_case import WorstCase, worst_case
 from hybrid_model.consensus.excitation.constants import ExcitationConstants, Signal, scenario_excitation
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = ["Analysis", "active_edges", "analyse", "connected_parts"]
 

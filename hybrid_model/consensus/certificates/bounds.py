@@ -23,8 +23,8 @@ from hybrid_model.consensus.certificates.rates import (
 )
 from hybrid_model.consensus.exact.worst_case import WorstCase
 from hybrid_model.consensus.graphs.undirected import incidence
-from hybrid_model.consensus.scenario.scenario_data import Scenario
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
 __all__ = ["Bounds", "with_threshold"]
 

@@ -15,7 +15,7 @@ from hybrid_model.consensus.certificates.observed import observe
 from hybrid_model.consensus.certificates.parts import part_scenarios
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = ["Certificates", "certify"]
 

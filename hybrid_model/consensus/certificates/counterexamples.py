@@ -17,9 +17,9 @@ from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import incidence, weighted_laplacian
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Network, Scenario, Weights
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
+from hybrid_model.consensus.scenario.files import load_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
 from hybrid_model.consensus.weights.switching import NoSwitching
 

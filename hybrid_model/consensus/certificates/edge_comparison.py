@@ -10,8 +10,8 @@ from hybrid_model.consensus.exact.edge_gains import edge_domain_gains
 from hybrid_model.consensus.exact.periodic_edge_domain import periodic_gains
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Scenario
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
 __all__ = ["EdgeComparison", "compare_edge_domain"]
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from hybrid_model.consensus.scenario.scenario_data import Scenario
-from hybrid_model.consensus.scenario.trigger_data import TriggerKind
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 __all__ = ["Envelope", "envelope", "sampled_threshold"]
 

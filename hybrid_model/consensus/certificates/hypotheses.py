@@ -12,8 +12,8 @@ from hybrid_model.consensus.certificates.analysis import Analysis, active_edges,
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.envelopes import envelope
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
-from hybrid_model.consensus.scenario.scenario_data import Scenario
-from hybrid_model.consensus.scenario.trigger_data import TriggerKind
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 __all__ = ["PAPER_LAWS", "Hypothesis", "bound_hypotheses", "network_hypotheses"]
 

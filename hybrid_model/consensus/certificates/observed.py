@@ -13,8 +13,8 @@ from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.graphs.undirected import disagreement_basis
 from hybrid_model.consensus.laws.closed_loop import agent_name
 from hybrid_model.consensus.runs.report import edge_norm, run_report
-from hybrid_model.consensus.scenario.scenario_data import Scenario
-from hybrid_model.consensus.scenario.trigger_data import TriggerKind
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 __all__ = ["Observation", "observe"]
 

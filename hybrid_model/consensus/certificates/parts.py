@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from hybrid_model.consensus.certificates.analysis import connected_parts
-from hybrid_model.consensus.scenario.scenario_data import Network, Scenario, Weights
+from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
 from hybrid_model.consensus.weights.switching import NoSwitching
 
 __all__ = ["part_scenarios"]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.excitation.constants import ExcitationConstants, Signal, WindowExtremes, scenario_excitation
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = [
     "BoundForm",

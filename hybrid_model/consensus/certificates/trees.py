@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound
 from hybrid_model.consensus.excitation.joint import tree_excitations
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
 __all__ = ["TreeRadius", "tree_radii"]
 

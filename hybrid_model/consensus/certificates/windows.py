@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 from hybrid_model.consensus.certificates.rates import rate_of_contraction, tree_contraction, tree_free_rate
 from hybrid_model.consensus.excitation.constants import Signal, excitation_horizon, signal_factor, window_extremes
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = ["BestWindow", "RateForm", "best_window", "rate_over_window", "search_window", "shortest_exciting_window"]
 

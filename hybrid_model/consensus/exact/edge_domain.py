@@ -7,7 +7,7 @@ import numpy as np
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import weighted_laplacian
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.gated_sine import ConstantWeight
 from hybrid_model.linear import StateSpace, named_system
 

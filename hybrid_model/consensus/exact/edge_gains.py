@@ -17,7 +17,7 @@ from hybrid_model.consensus.exact.exponential_sums import absolute_integral
 from hybrid_model.consensus.exact.worst_case import worst_case
 from hybrid_model.consensus.graphs.undirected import Edge, disagreement_basis, incidence, weighted_laplacian
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.linear import h_infinity_norm
 
 __all__ = ["EdgeGains", "edge_domain_gains", "impulse_modes"]

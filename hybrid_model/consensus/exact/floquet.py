@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from hybrid_model.consensus.exact.transition_grid import affordable_resolution, flow_cells
 from hybrid_model.consensus.excitation.constants import Signal, signal_factor
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.edge_weights import Piece
 
 __all__ = ["FloquetSpectrum", "floquet_spectrum", "transition_matrix"]

@@ -19,7 +19,7 @@ from hybrid_model.consensus.excitation.constants import Signal, signal_factor
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import Edge, disagreement_basis, incidence
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.linear import StateSpace, named_system
 
 __all__ = ["PeriodicGains", "period_map", "periodic_gains", "periodic_l2_gain"]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from hybrid_model.consensus.exact.transition_grid import FlowCells, affordable_resolution, flow_cells
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = ["ReachableSets"]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from hybrid_model.consensus.excitation.constants import Signal, signal_factor
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.carriers import Carrier
 from hybrid_model.consensus.weights.edge_weights import Piece
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hybrid_model.consensus.exact.reachable_sets import ReachableSets
 from hybrid_model.consensus.exact.transition_grid import dose_between
 from hybrid_model.consensus.graphs.undirected import disagreement_basis
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = ["WorstCase", "starting_directions", "worst_case"]
 

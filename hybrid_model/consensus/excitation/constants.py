@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hybrid_model.consensus.excitation.norm_integral import NormPrimitive
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.carriers import UnitCarrier
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 

@@ -24,7 +24,7 @@ from hybrid_model.consensus.excitation.constants import (
 )
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition, is_connected
 from hybrid_model.consensus.graphs.undirected import incidence
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = ["JointExcitation", "JointInterval", "TreeExcitation", "joint_excitation", "tree_excitations"]
 

@@ -18,7 +18,7 @@ from matplotlib.ticker import MaxNLocator
 from hybrid_model.consensus.figures.run import COLUMN, MARKER, plot_broadcasts, plot_error_against_threshold
 from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of
 from hybrid_model.consensus.runs.metrics import States, disagreement, gap_statistics
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.plots import COLORS, new_axes, plot_inter_event_times
 from hybrid_model.record.arc import HybridArc
 

@@ -17,7 +17,8 @@ from matplotlib.lines import Line2D
 from hybrid_model.consensus.certificates.rates import BoundForm, ConvergenceBound
 from hybrid_model.consensus.laws.closed_loop import agent_name
 from hybrid_model.consensus.runs.report import edge_norm
-from hybrid_model.consensus.scenario.scenario_data import Scenario, Trigger
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import Trigger
 from hybrid_model.plots import COLORS, JOURNAL, curve, new_axes, plot_raster
 from hybrid_model.record.arc import HybridArc
 

@@ -2,16 +2,58 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 import hybrid_model as hm
 from hybrid_model.consensus.laws.channels import Receiver
-from hybrid_model.consensus.laws.integrator import Integrator
-from hybrid_model.consensus.laws.triggers import DynamicTrigger, EventGenerator, MixedTrigger, StaticTrigger
-from hybrid_model.declare.variables import Kind
+from hybrid_model.declare.variables import Kind, Value
 
-__all__ = ["DynamicTrigger", "EventGenerator", "Integrator", "MixedTrigger", "StaticTrigger", "agent"]
+__all__ = ["ContinuousBroadcast", "ContinuousIntegrator", "Integrator", "agent"]
 
 SHOWN = ("broadcast", "events", "threshold", "decay", "broadcast_clock")
 """What an agent shows of its event generator under its own name, where the law has it."""
+
+
+class Integrator(hm.HybridAutomaton):
+    """A single integrator under the consensus protocol on broadcast values.
+
+    ``x' = -k sum_j w_j(t) (xhat - xhat_j)`` over the neighbours j, with the broadcast values xhat in place of the
+    states (paper, section 4: control law of the event-triggered agent).
+    """
+
+    degree = hm.Dimension("number of neighbours")
+    x = hm.State(0.0, description="state of the agent", output=True)
+    broadcast = hm.Input(0.0, discrete=True, description="broadcast value of the agent itself")
+    neighbours = hm.Input(0.0, shape="degree", discrete=True, description="broadcast values of the neighbours")
+    weights = hm.Input(0.0, shape="degree", unit="1/s", description="weights of the edges to the neighbours")
+    gain = hm.Parameter(1.0, description="control gain k")
+
+    def flow_map(self, s: hm.Values) -> dict[str, Value]:
+        """The consensus protocol."""
+        return {"x": -s.gain * np.sum(s.weights * (s.broadcast - s.neighbours))}
+
+
+class ContinuousIntegrator(Integrator):
+    """The single integrator under the consensus protocol on states (paper, section 3).
+
+    ``x' = -k sum_j w_j(t) (x - x_j)`` over the neighbours j. Their values change along flows, so agents of this kind
+    are composed to one automaton; they do not meet at events only.
+    """
+
+    broadcast = hm.Input(0.0, description="state of the agent itself")
+    neighbours = hm.Input(0.0, shape="degree", description="states of the neighbours")
+
+
+class ContinuousBroadcast(hm.HybridAutomaton):
+    """Stands in an event generator's place: the broadcast value is the state, and there are no events."""
+
+    x = hm.Input(0.0, description="state of the agent")
+    events = hm.DiscreteState(0, integer=True, output=True, description="number of broadcasts: none")
+    broadcast = hm.Output(description="the state")
+
+    def outputs(self, s: hm.Values) -> dict[str, Value]:
+        """No error."""
+        return {"broadcast": 1.0 * s.x}
 
 
 def agent(

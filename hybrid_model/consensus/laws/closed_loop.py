@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import hybrid_model as hm
-from hybrid_model.consensus.laws.agents import agent
+from hybrid_model.consensus.laws.agents import ContinuousIntegrator, Integrator, agent
 from hybrid_model.consensus.laws.channels import LossyChannel, link_seeds
-from hybrid_model.consensus.laws.continuous import ContinuousIntegrator
-from hybrid_model.consensus.laws.integrator import Integrator
 from hybrid_model.consensus.laws.trigger_blocks import Surroundings, trigger_block
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Scenario, TriggerKind
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 from hybrid_model.consensus.weights.blocks import switching_block, weights_block
 
 

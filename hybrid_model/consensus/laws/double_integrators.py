@@ -21,7 +21,7 @@ import hybrid_model as hm
 from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of, other_end
 from hybrid_model.consensus.laws.vector_agents import require_norm_trigger
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.start_states import start_numbers
 from hybrid_model.consensus.scenario.thresholds import mixed_threshold
 from hybrid_model.consensus.weights.blocks import switching_block, weights_block

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import hybrid_model as hm
-from hybrid_model.consensus.laws.continuous import ContinuousBroadcast
+from hybrid_model.consensus.laws.agents import ContinuousBroadcast
 from hybrid_model.consensus.laws.relative_triggers import GirardTrigger, RelativeTrigger
 from hybrid_model.consensus.laws.self_trigger_weights import ConstantSelfTrigger, GatedSineSelfTrigger, SineSelfTrigger
 from hybrid_model.consensus.laws.timed_triggers import PeriodicBroadcast, SampledTrigger
 from hybrid_model.consensus.laws.triggers import DynamicTrigger, MixedTrigger, StaticTrigger
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, Waveform, WeightMap
 from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching, Switching
 from hybrid_model.consensus.weights.waves import SineWeight

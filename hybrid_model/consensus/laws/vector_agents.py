@@ -9,9 +9,10 @@ import hybrid_model as hm
 from hybrid_model.consensus.laws.agents import agent
 from hybrid_model.consensus.laws.closed_loop import agent_name, broadcast_wires, edges_of
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Scenario, TriggerKind
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.start_states import start_vectors
 from hybrid_model.consensus.scenario.thresholds import mixed_threshold
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 from hybrid_model.consensus.weights.blocks import switching_block, weights_block
 from hybrid_model.declare.variables import Value
 

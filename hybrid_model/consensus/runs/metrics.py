@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.record.arc import HybridArc
 
 __all__ = [

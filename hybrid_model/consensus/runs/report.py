@@ -10,7 +10,7 @@ import numpy as np
 from hybrid_model import HybridArc
 from hybrid_model.consensus.graphs.undirected import incidence
 from hybrid_model.consensus.laws.closed_loop import agent_name
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.declare.variables import FloatArray
 
 

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from hybrid_model.consensus.runs.metrics import Performance, States, performance, run_states
 from hybrid_model.consensus.runs.periodic_run import periodic_run, slow_gain
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.record.arc import HybridArc
 
 __all__ = ["Measure", "Savings", "run_savings", "savings"]

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.switching import PeriodicSwitching, SwitchingSequence
 from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
 

@@ -4,7 +4,7 @@ import enum
 from collections.abc import Callable
 
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Network
+from hybrid_model.consensus.scenario.definition import Network
 from hybrid_model.consensus.scenario.tables import Table
 from hybrid_model.consensus.weights.random_switching import (
     Order,

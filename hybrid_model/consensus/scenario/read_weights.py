@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from hybrid_model.consensus.messages import ScenarioError, shown
+from hybrid_model.consensus.scenario.definition import WeightKind, Weights
 from hybrid_model.consensus.scenario.samples_file import read_samples
-from hybrid_model.consensus.scenario.scenario_data import WeightKind, Weights
 from hybrid_model.consensus.scenario.tables import Table
 from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
 from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight

@@ -18,7 +18,8 @@ from hybrid_model.consensus.certificates.rates import (
 from hybrid_model.consensus.excitation.constants import Signal, scenario_excitation
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import incidence
-from hybrid_model.consensus.scenario.scenario_file import Trigger, TriggerKind, load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
 
 def constant_network(agents, edges, initial, value=1.0, *, gain=1.0, threshold=0.5, decay=0.0, **more):

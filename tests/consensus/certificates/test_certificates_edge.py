@@ -18,7 +18,7 @@ from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.certify import certify
 from hybrid_model.consensus.excitation.constants import Signal, signal_factor
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.scenario.files import read_scenario
 
 # What a sum over cells of k int ||N|| <= 0.01 lacks, and the steps of the runs here, second order both.
 SHORT = 2e-4

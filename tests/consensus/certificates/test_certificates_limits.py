@@ -19,8 +19,8 @@ from hybrid_model.consensus.excitation.constants import Signal, signal_factor, w
 from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.graphs.undirected import complete_edges, disagreement_basis, incidence
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.native.compiled import compiled
 
 PATH_RATE = 2 - math.sqrt(2)

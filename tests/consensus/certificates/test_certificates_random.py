@@ -19,8 +19,8 @@ from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.energy import improved_contraction
 from hybrid_model.consensus.exact.transition_grid import flow_cells
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.files import read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
 # Grids of cells reach suprema from below by a share of the second order; runs are farther away than that. How near the
 # exact radius is to what errors can reach is the matter of test_certificates_edge.py.

@@ -8,7 +8,7 @@ import pytest
 import hybrid_model as hm
 from hybrid_model.consensus.certificates.certify import certify
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.native.compiled import compiled
 
 

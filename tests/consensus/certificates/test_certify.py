@@ -25,7 +25,7 @@ from hybrid_model.consensus.exact.worst_case import worst_case
 from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, weighted_laplacian
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.native.compiled import compiled
 
 

@@ -6,7 +6,7 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates.certify import certify
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_file import read_scenario
+from hybrid_model.consensus.scenario.files import read_scenario
 
 
 def pair(stop_time, initial, **trigger):

@@ -19,7 +19,7 @@ from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import weighted_laplacian
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.native.compiled import compiled
 
 ROOT = Path(__file__).parents[3]

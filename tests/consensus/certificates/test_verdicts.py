@@ -31,8 +31,8 @@ from hybrid_model.consensus.excitation.constants import Signal, signal_factor
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import complete_edges, disagreement_basis, incidence, weighted_laplacian
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.gated_sine import WeightMap
 from hybrid_model.native.compiled import compiled
 

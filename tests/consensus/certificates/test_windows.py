@@ -27,7 +27,7 @@ from hybrid_model.consensus.excitation.constants import (
 )
 from hybrid_model.consensus.excitation.joint import joint_excitation, tree_excitations
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, preset_names
+from hybrid_model.consensus.scenario.files import load_scenario, preset_names
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.functions import FunctionWeight
 from hybrid_model.consensus.weights.switching import NoSwitching

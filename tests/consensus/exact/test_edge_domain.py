@@ -11,7 +11,7 @@ from hybrid_model.consensus.exact.edge_domain import edge_domain_system
 from hybrid_model.consensus.graphs.undirected import incidence
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 
 
 @pytest.fixture

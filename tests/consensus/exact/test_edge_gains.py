@@ -17,7 +17,7 @@ from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_ma
 from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.errors import DeclarationError
 from hybrid_model.linear import h_infinity_norm
 

@@ -20,7 +20,7 @@ from hybrid_model.consensus.exact.periodic_edge_domain import period_map, period
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.metrics import run_states
 from hybrid_model.consensus.runs.report import edge_norm
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.native.compiled import compiled
 
 SEEDS = [21, 23, *(pytest.param(seed, marks=pytest.mark.long) for seed in (20, 22, 24, 25, 26, 27, 28, 29))]

@@ -12,7 +12,7 @@ from hybrid_model.consensus.excitation.constants import Signal, excitation_const
 from hybrid_model.consensus.excitation.norm_integral import NormPrimitive
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
 from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching

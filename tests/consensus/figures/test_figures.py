@@ -22,8 +22,8 @@ from hybrid_model.consensus.figures.run import (
 )
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import replace_trigger
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.definition import replace_trigger
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.plots import JOURNAL
 
 # In 1/s: no state is faster, for two neighbours, weights up to 4 and differences of states up to 1.7. A broadcast is

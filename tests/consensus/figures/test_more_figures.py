@@ -29,8 +29,8 @@ from hybrid_model.consensus.laws.closed_loop import closed_loop, edges_of
 from hybrid_model.consensus.runs.metrics import run_states
 from hybrid_model.consensus.runs.periodic_run import periodic_run
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Trigger, TriggerKind
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.files import load_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.native.compiled import compiled
 from hybrid_model.plots import JOURNAL
 

@@ -16,8 +16,8 @@ from cosim.masters import run_event_exact
 from hybrid_model.consensus.laws.channels import link_seeds
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Channel
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.channel import Channel
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.native.compiled import compiled
 
 TIME_TOLERANCE = 1e-8

@@ -17,8 +17,9 @@ from hybrid_model.consensus.laws.double_integrators import (
     double_integrator_wires,
 )
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Channel, Trigger, TriggerKind
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.channel import Channel
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.native.compiled import compiled
 
 DAMPING = 1.5

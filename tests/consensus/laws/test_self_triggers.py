@@ -18,8 +18,8 @@ from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
 from hybrid_model.consensus.laws.forecast import Forecast, Wave
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Trigger, TriggerKind
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.native.compiled import compiled
 
 TIME_TOLERANCE = 1e-8

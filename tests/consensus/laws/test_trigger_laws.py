@@ -17,8 +17,8 @@ from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Trigger, TriggerKind
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.native.compiled import compiled
 
 # The limits of the agreement of executions. Events amplify errors, so random runs are short.

@@ -14,8 +14,10 @@ from cosim.masters import run_event_exact
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_data import Channel, Trigger, TriggerKind
-from hybrid_model.consensus.scenario.scenario_file import read_scenario, replace_trigger
+from hybrid_model.consensus.scenario.channel import Channel
+from hybrid_model.consensus.scenario.definition import replace_trigger
+from hybrid_model.consensus.scenario.files import read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.native.compiled import compiled
 
 # The limits of the agreement test.

@@ -13,8 +13,9 @@ from cosim.masters import run_event_exact
 from cosim.system import System
 from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop, vector_wires
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.scenario_data import Channel, Trigger, TriggerKind
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.channel import Channel
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.native.compiled import compiled
 
 STARTS = np.array([[1.0, 0.2, -0.3], [-0.4, 0.5, 0.9], [0.3, -0.7, 0.1]])

@@ -8,7 +8,7 @@ from oracles.exact_consensus import exact_run, safe_step
 from scipy.integrate import solve_ivp
 
 from hybrid_model.consensus.graphs.undirected import complete_edges, weighted_laplacian
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 
 TWO_AGENTS = {
     "name": "two",

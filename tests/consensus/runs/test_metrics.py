@@ -21,8 +21,8 @@ from hybrid_model.consensus.runs.metrics import (
 from hybrid_model.consensus.runs.periodic_run import periodic_run, slow_gain
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.runs.savings import Measure, run_savings
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.native.compiled import compiled
 
 

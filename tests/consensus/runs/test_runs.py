@@ -11,7 +11,7 @@ from cosim.consensus import fmu_system, in_process_system, network_report
 from cosim.masters import run_event_exact
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 
 # The limits. Events amplify errors where thresholds have decayed, so random scenarios stay short.
 TIME_TOLERANCE = 1e-8

@@ -13,7 +13,7 @@ from hybrid_model.consensus.runs.metrics import performance, run_states
 from hybrid_model.consensus.runs.periodic_run import periodic_run, slow_gain
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.runs.savings import Measure, run_savings
-from hybrid_model.consensus.scenario.scenario_file import load_scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.native.compiled import compiled
 
 PAGE = (Path(__file__).parents[3] / "docs" / "savings.md").read_text(encoding="utf-8")

@@ -10,7 +10,8 @@ from oracles.table_runs import table_run
 import hybrid_model as hm
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.consensus.scenario.scenario_file import read_scenario, replace_trigger
+from hybrid_model.consensus.scenario.definition import replace_trigger
+from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.native.compiled import compiled
 
 # The limits for times of events and for states.

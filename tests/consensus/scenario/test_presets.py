@@ -17,7 +17,7 @@ from hybrid_model.consensus.excitation.constants import Signal, signal_factor
 from hybrid_model.consensus.graphs.undirected import complete_edges
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import edge_norm, run_report
-from hybrid_model.consensus.scenario.scenario_file import load_scenario, preset_names, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
 from hybrid_model.consensus.weights.gated_sine import WeightMap
 from hybrid_model.native.compiled import compiled
 

@@ -7,14 +7,9 @@ import numpy as np
 import pytest
 
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_data import Scenario
-from hybrid_model.consensus.scenario.scenario_file import (
-    ScenarioError,
-    WeightKind,
-    Weights,
-    load_scenario,
-    read_scenario,
-)
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.definition import Scenario, WeightKind, Weights
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.consensus.weights.functions import FunctionWeight
 from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
 from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching, SwitchingSequence

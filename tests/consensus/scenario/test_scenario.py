@@ -8,20 +8,12 @@ import pytest
 
 from hybrid_model.consensus.graphs.undirected import complete_edges
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.scenario_file import (
-    NoSwitching,
-    PeriodicSwitching,
-    ScenarioError,
-    Trigger,
-    TriggerKind,
-    Underlying,
-    WeightKind,
-    load_scenario,
-    preset_names,
-    read_scenario,
-    replace_trigger,
-)
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.definition import Underlying, WeightKind, replace_trigger
+from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
+from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching
 
 VALID = {
     "name": "three",

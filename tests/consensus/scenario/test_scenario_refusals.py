@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from cosim.cli.main import main
-from hybrid_model.consensus.scenario.scenario_file import ScenarioError, load_scenario, read_scenario
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 
 BASE = {
     "name": "three",

@@ -10,42 +10,20 @@ from typing import Any
 
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.affordable import require_affordable
-from hybrid_model.consensus.scenario.channel_data import IDEAL
-from hybrid_model.consensus.scenario.read_switching import read_switching
-from hybrid_model.consensus.scenario.read_weights import read_weights
-from hybrid_model.consensus.scenario.scenario_data import (
-    Channel,
+from hybrid_model.consensus.scenario.channel import IDEAL, Channel
+from hybrid_model.consensus.scenario.definition import (
     Network,
     Scenario,
-    Trigger,
-    TriggerKind,
     Underlying,
-    WeightKind,
-    Weights,
     replace_trigger,
 )
+from hybrid_model.consensus.scenario.read_switching import read_switching
+from hybrid_model.consensus.scenario.read_weights import read_weights
 from hybrid_model.consensus.scenario.tables import Table, suggestion
-from hybrid_model.consensus.scenario.trigger_data import trigger_keys
-from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching, Switching
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind, trigger_keys
+from hybrid_model.consensus.weights.switching import NoSwitching, Switching
 
-__all__ = [
-    "Channel",
-    "Network",
-    "NoSwitching",
-    "PeriodicSwitching",
-    "Scenario",
-    "ScenarioError",
-    "Switching",
-    "Trigger",
-    "TriggerKind",
-    "Underlying",
-    "WeightKind",
-    "Weights",
-    "load_scenario",
-    "preset_names",
-    "read_scenario",
-    "replace_trigger",
-]
+__all__ = ["load_scenario", "preset_names", "read_scenario"]
 
 _PRESETS = resources.files("hybrid_model.consensus.scenario") / "presets"
 

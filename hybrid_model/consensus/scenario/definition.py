@@ -7,8 +7,8 @@ from functools import cached_property
 
 from hybrid_model.consensus.graphs.undirected import Edge, complete_edges, validate_edges
 from hybrid_model.consensus.messages import ScenarioError, shown
-from hybrid_model.consensus.scenario.channel_data import IDEAL, Channel
-from hybrid_model.consensus.scenario.trigger_data import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.channel import IDEAL, Channel
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine
 from hybrid_model.consensus.weights.switching import Switching
@@ -16,17 +16,7 @@ from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
 from hybrid_model.consensus.weights.waveform import Waveform
 from hybrid_model.consensus.weights.waves import SineWeight, SquareWeight
 
-__all__ = [
-    "Channel",
-    "Network",
-    "Scenario",
-    "Trigger",
-    "TriggerKind",
-    "Underlying",
-    "WeightKind",
-    "Weights",
-    "replace_trigger",
-]
+__all__ = ["Network", "Scenario", "Underlying", "WeightKind", "Weights", "replace_trigger"]
 
 
 class Underlying(enum.Enum):
