@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 import numpy as np
 
 from cosim.errors import CosimError, MisfitError
 from cosim.slave import Port, Slave, Step, Update, Value
-from hybrid_model import Automaton, Execution, Solver
+from hybrid_model import Automaton, Execution, Solver, ZenoGuard
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import Kind, element_names
@@ -97,6 +98,8 @@ class AutomatonSlave(Slave):
             t_stop=t_stop,
             inputs=Inputs(Layout(self.automaton)),
             solver=self._solver,
+            # Nothing is recorded, so nothing grows with the number of jumps (rule 7).
+            zeno=ZenoGuard(max_jumps=sys.maxsize),
         )
         self._block = AutomatonBlock(self.name, run, t_stop, predictable=self._predictable, events=events, keep=False)
         for name, value in self._starts.items():

@@ -28,20 +28,50 @@ ABSOLUTE = 1e-15
 """Absolute tolerance of a step, as a part of the usual size of a state."""
 ROUNDING_LEVEL = 3e-14
 """A state below this part of the largest one may be rounding: no digit of it is to be had."""
+UNKNOWN = 1e-6
+"""States below this part of where their flow may lead have shown no size yet."""
+REACH_AT = (1e-3, 0.03, 0.3, 1.0)
+REACH_STEP = 1e-3
+"""Parts of a flow at which its rates are looked at, and of that time by which states are moved to see them turn."""
+EULER_PART = 0.01
+"""The Euler step that tells the length of a first step moves the states by this part of their size."""
+BLIND_PART = 1e-3
+"""Part of the flow that the Euler step is, where the states have no size yet."""
+FIRST_GROWTH = 100.0
+"""The first step is at most this many times the Euler step."""
+FIRST_LEAST = 64.0
+"""In ulp: the shortest first step."""
 PROBE = 1e-6
 """Where a flow leads from a border is looked at after this part of a step of the solver."""
 OVERSHOOT = 1000.0
 """In ulp: so far before a guard a solver may get stuck if the flow map cannot be evaluated behind it."""
+JUMPS_AT_ONCE = 1000
+"""So many jumps of one name may happen at one instant."""
+JUMPS_IN_WINDOW = 100
+"""So many jumps of one name are a burst, which may be an accumulation."""
 ACCUMULATION = 1e-6
 """Jumps accumulate if what is left of the geometric series of their gaps is below this part of its longest gap."""
+SPREAD = 0.05
+"""Ratios of successive gaps that differ by less than this part count as one."""
 CROWD = 1e-6
-"""Jumps crowd if many of them come within this part of the longest gap since the last pause."""
+"""Jumps crowd if a burst of them comes within this part of the longest gap since the last pause."""
 RESOLVED = 1e4
 """In ulp: gaps below have ratios that rounding blurs, so a geometric series is judged before."""
 CHATTER = 1000.0
 """In ulp: jumps at gaps below are no events in time any more."""
 PAUSE = 1e-4
 """A gap that is below this part of the one before does not continue it: what was before is a pause."""
+
+_IN_MODELS = (
+    *("roundings", "instant", "instant_in_gap", "border", "absolute", "rounding_level", "unknown", "probe"),
+    *("overshoot", "jumps_at_once", "jumps_in_window", "accumulation", "spread", "crowd", "resolved", "chatter"),
+    *("pause", "euler_part", "blind_part", "first_growth", "first_least", "reach_step", "reach_at"),
+)
+
+
+def of_models() -> dict[str, float | tuple[float, ...]]:
+    """Return the numbers that every exported model carries, by their names in ``ModelScales`` (engine/model.h)."""
+    return {name: globals()[name.upper()] for name in _IN_MODELS}
 
 
 def ulp(t: float) -> float:
@@ -65,10 +95,6 @@ def one_instant(t: float, t_start: float, t_last: float) -> float:
         In s.
     """
     return max(ROUNDINGS * ulp(t), min(INSTANT * (t - t_start), INSTANT_IN_GAP * (t - t_last)))
-
-
-UNKNOWN = 1e-6
-"""States below this part of where their flow may lead have shown no size yet."""
 
 
 def usual_sizes(sizes: FloatArray, history: FloatArray) -> FloatArray:

@@ -56,21 +56,6 @@ _MAPS = (
     *("start", "flow", "flow_set", "margins", "times", "outputs", "reset"),
     *("forward", "reverse", "start_forward", "start_reverse"),
 )
-_SCALES = (
-    *(
-        "roundings",
-        "instant",
-        "instant_in_gap",
-        "border",
-        "absolute",
-        "rounding_level",
-        "unknown",
-        "probe",
-        "overshoot",
-    ),
-    *("accumulation", "crowd", "resolved", "chatter", "pause"),
-)
-"""As `ModelScales` has them; the numbers are those of `hybrid_model.scales`."""
 _PRELUDE = """\
 /* Generated from an automaton.  Its names stay inside, and its maps need not use all that they are given. */
 #include <math.h>
@@ -94,6 +79,7 @@ def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> l
     tables = [
         *(array("double", f"start_{name}", map(constant, layout.start(kind))) for name, kind in starts),
         array("double", "nominals", map(constant, _nominals(layout))),
+        array("bool", "whole", map(boolean, layout.whole)),
         array("ModelName", "state_names", map(names.entry, layout.names(Kind.STATE))),
         array("ModelName", "discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
         array("ModelName", "margin_names", map(names.entry, margin_names)),
@@ -108,6 +94,10 @@ def _nominals(layout: Layout) -> list[float]:
     """Return a usual size of each continuous state, 0 where none is declared."""
     variables = [place.variable for place in layout.places[Kind.STATE]]
     return [0.0 if v.nominal is None else v.nominal for v in variables for _ in range(v.size)]
+
+
+def _number(value: float | tuple[float, ...]) -> str:
+    return row(*map(constant, value)) if isinstance(value, tuple) else constant(value)
 
 
 def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
@@ -155,8 +145,8 @@ def _model(
         "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
         **{name: f"hybrid_{name}" for name in _MAPS},
-        "scales": row(*(constant(getattr(scales, name.upper())) for name in _SCALES)),
-        **{name: name for name in ("nominals", "jumps", "clock_jump", "variables")},
+        "scales": row(*(f".{name} = {_number(value)}" for name, value in scales.of_models().items())),
+        **{name: name for name in ("nominals", "whole", "jumps", "clock_jump", "variables")},
         **{name: name for name in ("state_names", "discrete_names", "margin_names", "names")},
     }
     return "const Model model = {\n" + "".join(f"    .{key} = {value},\n" for key, value in fields.items()) + "};\n"

@@ -68,6 +68,11 @@ class Layout:
         starts = [place.variable.start.ravel() for place in self.places[kind]]
         return np.concatenate(starts) if starts else np.zeros(0)
 
+    @property
+    def whole(self) -> list[bool]:
+        """Of each scalar discrete state, whether it is declared integer."""
+        return [place.variable.integer for place in self.places[Kind.DISCRETE] for _ in range(place.variable.size)]
+
     def names(self, kind: Kind) -> list[str]:
         """Return the names of the scalars in the vector of one kind."""
         return [name for place in self.places[kind] for name in element_names(place.variable)]

@@ -29,10 +29,6 @@ static const double DENSE_WEIGHT[N_STAGES] = {-12715105075.0 / 11282082432.0, 0.
 
 /* Of the starting step; see hybrid_model/reference/first_step.py. */
 #define ORDER 5.0
-#define EULER_PART 0.01
-#define BLIND_PART 1e-3
-#define FIRST_GROWTH 100.0
-#define REACH_STEP 1e-3
 
 double time_ulp(double t)
 {
@@ -149,17 +145,17 @@ static double speed_at(Engine *engine, const Point *point, double t, double step
 
 bool raise_floor(Engine *engine, const Point *point, double limit)
 {
-    const double parts[] = {1e-3, 0.03, 0.3, 1.0};   /* see reach in hybrid_model/reference/borders.py */
+    const ModelScales *scales = &engine->model->scales;
     Status *status = engine->status;
     double turned, found = 0.0;
-    for (size_t i = 0; i < sizeof parts / sizeof *parts && engine->model->n_states > 0; i++) {
-        double span = parts[i] * (limit - *point->time);
+    for (size_t i = 0; i < N_REACH_AT && engine->model->n_states > 0; i++) {
+        double span = scales->reach_at[i] * (limit - *point->time);
         if (!isfinite(span) || !(span > 0.0))
             continue;
-        double speed = speed_at(engine, point, *point->time + span, REACH_STEP * span, &turned);
+        double speed = speed_at(engine, point, *point->time + span, scales->reach_step * span, &turned);
         found = fmax(found, speed > 0.0 ? speed * (turned * span > 1.0 ? 1.0 / turned : span) : 0.0);
     }
-    if (!(largest_state(engine, point, point->x) < engine->model->scales.unknown * found))
+    if (!(largest_state(engine, point, point->x) < scales->unknown * found))
         return false;
     status->floor = found;
     return true;
@@ -169,13 +165,14 @@ bool raise_floor(Engine *engine, const Point *point, double limit)
    ratios occur, so that no unit matters: see hybrid_model/reference/first_step.py. */
 bool first_step(Engine *engine, const Point *point, double limit, double *h)
 {
+    const ModelScales *scales = &engine->model->scales;
     Step *step = &engine->step;
     size_t n = engine->model->n_states;
     double t = *point->time, whole = limit - t, speed = largest_of(n, step->k[0], NULL);
     double size = n > 0 ? largest_state(engine, point, point->x) : 0.0;
-    bool known = size > DBL_MIN / engine->model->scales.absolute;
-    double least = fmin(whole, 64.0 * fmax(time_ulp(t), isfinite(limit) ? time_ulp(limit) : 0.0));
-    double euler = speed > 0.0 && known ? EULER_PART * size / speed : BLIND_PART * whole;
+    bool known = size > DBL_MIN / scales->absolute;
+    double least = fmin(whole, scales->first_least * fmax(time_ulp(t), isfinite(limit) ? time_ulp(limit) : 0.0));
+    double euler = speed > 0.0 && known ? scales->euler_part * size / speed : scales->blind_part * whole;
     *h = euler = isfinite(euler) ? fmax(least, fmin(euler, whole)) : least;
     if (!(speed > 0.0) || !isfinite(speed))
         return true;
@@ -187,9 +184,9 @@ bool first_step(Engine *engine, const Point *point, double limit, double *h)
     if (!isfinite(turned))
         return true;
     double reach = fmax(known ? size : 0.0, speed * euler);
-    double allowed = EULER_PART * engine->status->relative_tolerance * reach / speed;
+    double allowed = scales->euler_part * engine->status->relative_tolerance * reach / speed;
     double chosen = turned > 0.0 ? pow(allowed * turned, 1.0 / (ORDER + 1.0)) / turned : (double)INFINITY;
-    *h = fmax(least, fmin(fmin(FIRST_GROWTH * euler, chosen), whole));
+    *h = fmax(least, fmin(fmin(scales->first_growth * euler, chosen), whole));
     return true;
 }
 

@@ -20,17 +20,14 @@ size_t engine_jumps_taken(const Engine *engine)
     return (size_t)engine->status->jumps_taken;
 }
 
-/* Says which state the jump (n_jumps: the start map) has made a number that it must not be. */
-static bool not_finite(Engine *engine, size_t jump, size_t i, double t)
+/* Says what the jump (n_jumps: the start map) has made of state i against the rule. */
+static bool refused(Engine *engine, Ending ending, size_t jump, size_t i, double t, const char *rule)
 {
     const Model *m = engine->model;
     bool starts = jump == m->n_jumps;
-    return problem(engine, ENDED_NOT_FINITE,
-                   "'%s' becomes %g at t = %.17g by %s%s%s; states must be finite. Remedy: check that map and the "
-                   "parameters.",
-                   NAME_AT(m, state_name(m, i)), engine->reset.x[i], t,
-                   starts ? "its start value" : "the jump map of '",
-                   starts ? "" : NAME_AT(m, m->jumps[jump].name), starts ? "" : "'");
+    return problem(engine, ending, "'%s' becomes %.9g at t = %.17g by %s%s%s; %s", NAME_AT(m, state_name(m, i)),
+                   engine->reset.x[i], t, starts ? "its start value" : "the jump map of '",
+                   starts ? "" : NAME_AT(m, m->jumps[jump].name), starts ? "" : "'", rule);
 }
 
 bool accept_state(Engine *engine, size_t jump, const Point *point)
@@ -38,7 +35,12 @@ bool accept_state(Engine *engine, size_t jump, const Point *point)
     const Model *m = engine->model;
     for (size_t i = 0; i < m->n_states + m->n_discrete; i++)
         if (!isfinite(engine->reset.x[i]))
-            return not_finite(engine, jump, i, *point->time);
+            return refused(engine, ENDED_NOT_FINITE, jump, i, *point->time,
+                           "states must be finite. Remedy: check that map and the parameters.");
+    for (size_t i = 0; i < m->n_discrete; i++)
+        if (m->whole[i] && engine->reset.z[i] != floor(engine->reset.z[i]))
+            return refused(engine, ENDED_FAILED, jump, m->n_states + i, *point->time,
+                           "it is declared integer and must stay a whole number. Remedy: round it in that map.");
     copy_values(point->x, engine->reset.x, m->n_states + m->n_discrete);
     note_sizes(engine, point);
     *point->step = 0.0;
@@ -55,14 +57,6 @@ static bool evaluate_reset(Engine *engine, size_t jump, const Point *point)
     engine->res[0] = engine->reset.x;
     engine->res[1] = engine->reset.z;
     return engine->model->reset(jump, engine->arg, engine->res, engine->iw, engine->w) == 0;
-}
-
-bool apply_reset(Engine *engine, size_t jump, const Point *point)
-{
-    if (evaluate_reset(engine, jump, point))
-        return accept_state(engine, jump, point);
-    return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
-                   NAME_AT(engine->model, engine->model->jumps[jump].name), *point->time);
 }
 
 bool evaluate_times(Engine *engine, const Point *point)
@@ -82,19 +76,27 @@ bool evaluate_times(Engine *engine, const Point *point)
     return true;
 }
 
-static size_t time_jumps_allowed(const Engine *engine)
+/* The jump of a time event must move its time on, though not yet past the present. */
+static bool moved_on(Engine *engine, size_t jump, double was, const Point *point)
 {
-    return JUMPS_AT_ONE_TIME * engine->model->n_times;
+    if (!evaluate_times(engine, point))
+        return false;
+    double now = engine->times[engine->model->jumps[jump].index];
+    return now > was || problem(engine, ENDED_FAILED,
+                                "The time event '%s' was due at %.17g s and after its jump is due at %.17g s. Remedy: "
+                                "let its jump map move its time on.",
+                                NAME_AT(engine->model, engine->model->jumps[jump].name), was, now);
 }
 
-static bool stuck_in_time(Engine *engine, size_t jump, double t)
+bool apply_reset(Engine *engine, size_t jump, const Point *point)
 {
-    return problem(engine, ENDED_ZENO,
-                   "Zeno: time events, the last of them '%s', were taken more than %zu times at t = %.17g s; the next "
-                   "time must lie after the present one. Remedy: let the jump map move the time on past it; where a run "
-                   "starts later than its clock, declare the clock's state with computed=True and let start_map give "
-                   "the next time to come.",
-                   NAME_AT(engine->model, engine->model->jumps[jump].name), time_jumps_allowed(engine), t);
+    const ModelJump *entry = &engine->model->jumps[jump];
+    double was = entry->kind == JUMP_ON_TIME ? engine->times[entry->index] : 0.0;
+    if (!evaluate_reset(engine, jump, point))
+        return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
+                       NAME_AT(engine->model, entry->name), *point->time);
+    return accept_state(engine, jump, point) &&
+           (entry->kind == JUMP_ON_STATE || moved_on(engine, jump, was, point));
 }
 
 /* The first breakpoint of the flow that is due, n_jumps if there is none. */
@@ -112,8 +114,9 @@ static size_t first_internal(const Engine *engine, const Point *point)
    of the same instant that comes before a breakpoint sees the state before it. */
 bool take_internal_jumps(Engine *engine, const Point *point)
 {
-    size_t n = engine->model->n_jumps, visible;
-    for (size_t repeats = 0;; repeats++) {
+    const Model *m = engine->model;
+    size_t n = m->n_jumps, visible, last = n, repeats = 0, all = 0;
+    for (;;) {
         if (!evaluate_times(engine, point))
             return false;
         size_t internal = first_internal(engine, point);
@@ -123,8 +126,11 @@ bool take_internal_jumps(Engine *engine, const Point *point)
             return false;
         if (visible < internal)
             return true;
-        if (repeats == time_jumps_allowed(engine))
-            return stuck_in_time(engine, internal, *point->time);
+        repeats = internal == last ? repeats + 1 : 1;
+        last = internal;
+        /* Those that enable each other in turn have an end as well. */
+        if ((double)repeats > m->scales.jumps_at_once || (double)++all > m->scales.jumps_at_once * (double)m->n_times)
+            return too_many_at_once(engine, internal, repeats > 1 ? repeats : all, *point->time);
         if (!apply_reset(engine, internal, point))
             return false;
     }
@@ -182,15 +188,8 @@ static void tick(Engine *engine, size_t jump)
 /* Counts a visible jump; false if there are too many. */
 static bool count_jump(Engine *engine, size_t jump)
 {
-    Status *status = engine->status;
-    double t = *engine->live.time;
-    if (status->jumps_time != t) {
-        status->jumps_time = t;
-        status->time_jumps_there = 0;
-    }
-    status->jumps_taken++;
-    if (engine->model->jumps[jump].kind == JUMP_ON_TIME)
-        return ++status->time_jumps_there <= time_jumps_allowed(engine) || stuck_in_time(engine, jump, t);
+    engine->status->jumps_time = *engine->live.time;
+    engine->status->jumps_taken++;
     return zeno_record(engine, jump);
 }
 

@@ -3,6 +3,7 @@
    A guard is crossed on (t0, t1] when its margin goes from negative to zero or above.  Crossings
    close enough are one instant, the latest of them; a flow that ends shortly before
    a crossing counts as having reached it. */
+#include <float.h>
 #include <math.h>
 
 #include "search.h"
@@ -202,6 +203,27 @@ bool reach_guard(Engine *engine, const Point *point, double limit)
     return true;
 }
 
+/* A margin that is now 0 and now 1 along the step says no and yes, and is never outside its set. */
+static bool refuse_indicators(Engine *engine, const Search *search)
+{
+    const Model *m = engine->model;
+    for (size_t row = 0; row < search->n_rows - !m->has_flow_set; row++) {
+        size_t zeros = 0, ones = 0;
+        for (size_t i = 0; i < N_SAMPLES && zeros + ones == i; i++) {
+            double margin = row == search->exit_row ? -sample(search, i, row) : sample(search, i, row);
+            zeros += margin == 0.0 || margin == DBL_MIN;
+            ones += margin == 1.0;
+        }
+        if (zeros > 0 && ones > 0 && zeros + ones == N_SAMPLES)
+            return problem(engine, ENDED_FAILED,
+                           "The margin of %s'%s' is 0 or 1 along the flow up to t = %.17g, as if it said no or yes. "
+                           "Remedy: return a number that is zero or above inside the set and negative outside.",
+                           row == search->exit_row ? "the flow set of " : "jump ",
+                           row == search->exit_row ? m->name : NAME_AT(m, m->margin_names[row]), engine->step.t1);
+    }
+    return true;
+}
+
 FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end)
 {
     const Model *m = engine->model;
@@ -214,6 +236,8 @@ FlowEnd locate_event(Engine *engine, const Point *point, double level, double pi
         if (!look(&search, ON_INTERPOLATION, t, engine->samples + i * search.n_rows))
             return FLOW_PROBLEM;
     }
+    if (!refuse_indicators(engine, &search))
+        return FLOW_PROBLEM;
     double guard = INFINITY, leaving = INFINITY;
     bool has_guard = first_guard(&search, &guard);
     bool leaves = m->has_flow_set && !search.failed && first_exit(&search, &leaving);

@@ -58,11 +58,13 @@ typedef struct {
     bool tunable;          /* a parameter that may be set at events and communication points */
 } ModelVariable;
 
+#define N_REACH_AT 4
 /* The numbers of the semantics, none of which is in seconds or in the unit of a state: see
    hybrid_model/scales.py, from which the exporter takes them. */
 typedef struct {
     double roundings, instant, instant_in_gap, border, absolute, rounding_level, unknown, probe, overshoot;
-    double accumulation, crowd, resolved, chatter, pause;
+    double jumps_at_once, jumps_in_window, accumulation, spread, crowd, resolved, chatter, pause;
+    double euler_part, blind_part, first_growth, first_least, reach_step, reach_at[N_REACH_AT];
 } ModelScales;
 
 typedef struct {
@@ -78,6 +80,7 @@ typedef struct {
     bool predictable;                  /* all inputs discrete: the next event follows from the state */
     const double *x, *z, *u, *p;       /* start values */
     const double *nominals;            /* a usual size of each continuous state, 0 if none is declared */
+    const bool *whole;                 /* of each discrete state: whether it is declared integer */
     ModelScales scales;
     ModelFunction start;               /* (t,x,z,u,p) -> x0, z0: start values that are computed; copies the others */
     ModelFunction flow;                /* -> dx/dt (n_states) */

@@ -12,7 +12,8 @@
 
 #define N_STAGES 7            /* Dormand-Prince 5(4) */
 #define N_SAMPLES 9           /* of each margin, where a step is looked at for crossings */
-#define N_ZENO_TIMES 12       /* remembered times of each jump */
+#define N_GAPS 8              /* gaps of each jump that must look geometric */
+#define N_ZENO_TIMES (N_GAPS + 1)
 #define N_SEGMENT 5           /* vectors that give the state on a step: at its start, its change, its curvature (3) */
 #define MESSAGE_SIZE 768
 
@@ -30,8 +31,6 @@
 /* A step that communication points are read from is that much shorter than its error allows: the error of the
    interpolation is some ten times as great, and falls with the fifth power. */
 #define SEGMENT_PART 0.35
-/* Jumps at one instant: of each jump on the state, and of the time events together, times their number. */
-#define JUMPS_AT_ONE_TIME 1000
 
 /* A point of the run.  time, step, x, z, level and size lie one after the other in memory, so one copy
    moves them all; size holds the largest value that each continuous state has had; step is the solver's proposal for the next step, 0 when there is none.  level is
@@ -76,8 +75,7 @@ typedef struct {
     double relative_tolerance;
     double floor;                 /* size that all states have at least, where they have shown none by themselves */
     double start_time, stop_time;
-    double jumps_time;            /* of the last visible jump, at which time_jumps_there counts */
-    uint64_t time_jumps_there;
+    double jumps_time;            /* of the last visible jump */
     uint64_t jumps_taken;         /* in the last advance */
     /* The live point lies on a step of the solver that goes on to segment_end. */
     double segment_begin, segment_end;
@@ -167,9 +165,10 @@ void clear_levels(const Engine *engine, const Point *point);
 void changed(Engine *engine);
 
 /* jumps.c */
-/* Copies the new state in engine->reset into the point if all of it is finite; it comes from a jump, or
-   (n_jumps) from the start map. */
+/* Copies the new state in engine->reset into the point if all of it is finite, and whole where it must be; it comes
+   from a jump, or (n_jumps) from the start map. */
 bool accept_state(Engine *engine, size_t jump, const Point *point);
+/* Takes a jump that is due at the point, for which the event times must be there; those afterwards are there then. */
 bool apply_reset(Engine *engine, size_t jump, const Point *point);
 bool evaluate_times(Engine *engine, const Point *point);
 /* Takes the breakpoints of the flow that are due and come before any visible jump. */
@@ -236,6 +235,8 @@ bool mend_sensitivities(Engine *engine, double *const seeds[N_SEEDS]);
 /* zeno.c */
 /* Records a jump of the live point at its time; false if it is one too many. */
 bool zeno_record(Engine *engine, size_t jump);
+/* Notes that a jump is taken at one instant for the `count`th time, which is once too often; always false. */
+bool too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t);
 
 #if defined(__GNUC__)
 #pragma GCC visibility pop

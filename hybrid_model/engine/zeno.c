@@ -1,16 +1,12 @@
-/* The Zeno guard: what is counted for each jump on the state, and when a run stops.  Each jump is
-   counted by itself: many parts of a model that jump together are not yet an accumulation.
+/* The Zeno guard: what is counted for each jump, and when a run stops.  Each jump is counted by itself: many parts of
+   a model that jump together are not yet an accumulation.  It decides as hybrid_model/reference/zeno.py does.
 
-   (a) more jumps at one instant than any cascade needs; (b) gaps that shrink like a geometric
+   (a) more jumps at one instant than any cascade needs; and of jumps on the state (b) gaps that shrink like a geometric
    sequence whose rest is small beside them: the jumps accumulate; (c) a burst of jumps that is
    small beside the longest gap since the last pause, or that floating point does not resolve. */
 #include <math.h>
 
 #include "parts.h"
-
-#define N_GAPS 8                  /* gaps that must look geometric */
-#define RATIO_SPREAD 0.05
-#define BURST_JUMPS 100
 
 static double last_gap(const JumpHistory *history)
 {
@@ -42,7 +38,7 @@ static void remember(const ModelScales *scales, JumpHistory *history, double t)
     history->times[N_ZENO_TIMES - 1] = t;
     if (history->stored < N_ZENO_TIMES)
         history->stored++;
-    if (history->burst == 0 || history->burst >= BURST_JUMPS) {
+    if (history->burst == 0 || (double)history->burst >= scales->jumps_in_window) {
         history->burst_start = t;
         history->burst = 0;
     }
@@ -54,12 +50,12 @@ static bool crowded(const Engine *engine, const JumpHistory *history, double t)
 {
     const ModelScales *scales = &engine->model->scales;
     double span = t - history->burst_start;
-    double least = BURST_JUMPS * scales->chatter * time_ulp(t);
-    return history->burst >= BURST_JUMPS && span <= fmax(scales->crowd * history->longest, least);
+    double least = scales->jumps_in_window * scales->chatter * time_ulp(t);
+    return (double)history->burst >= scales->jumps_in_window && span <= fmax(scales->crowd * history->longest, least);
 }
 
 /* Whether the newest gaps shrink geometrically: the last gap, and the last ratio. */
-static bool shrinking(const JumpHistory *history, double *gap, double *ratio)
+static bool shrinking(const ModelScales *scales, const JumpHistory *history, double *gap, double *ratio)
 {
     if (history->stored < N_GAPS + 1)
         return false;
@@ -71,25 +67,41 @@ static bool shrinking(const JumpHistory *history, double *gap, double *ratio)
         least = fmin(least, *ratio);
         greatest = fmax(greatest, *ratio);
     }
-    return greatest < 1.0 && greatest - least <= RATIO_SPREAD * *ratio;
+    return greatest < 1.0 && greatest - least <= scales->spread * *ratio;
+}
+
+bool too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t)
+{
+    const ModelJump *entry = &engine->model->jumps[jump];
+    const char *name = NAME_AT(engine->model, entry->name);
+    if (entry->kind == JUMP_ON_TIME)
+        return problem(engine, ENDED_ZENO,
+                       "Zeno: %llu jumps of '%s' at one instant, t = %.10g s: its time is still not after the present. "
+                       "Remedy: let the jump map move the time on past it; where a run starts later than its clock, "
+                       "declare the clock's state with computed=True and let start_map give the next time to come.",
+                       count, name, t);
+    return problem(engine, ENDED_ZENO,
+                   "Zeno: %llu jumps of '%s' at one instant, t = %.10g s. "
+                   "Remedy: let the jump leave its jump set, or give the jump set a minimum dwell time; a trigger "
+                   "whose two sides are both zero fires for ever unless its inequality is strict.",
+                   count, name, t);
 }
 
 bool zeno_record(Engine *engine, size_t jump)
 {
+    const ModelScales *scales = &engine->model->scales;
     JumpHistory *history = &engine->history[jump];
     const char *name = NAME_AT(engine->model, engine->model->jumps[jump].name);
     double t = *engine->live.time, gap = 0.0, ratio = 0.0;
-    remember(&engine->model->scales, history, t);
-    unsigned long long total = history->total, at_once = history->at_once, burst = history->burst;
-    if (at_once > JUMPS_AT_ONE_TIME)
-        return problem(engine, ENDED_ZENO,
-                       "Zeno: %llu jumps of '%s' at one instant, t = %.10g s. "
-                       "Remedy: let the jump leave its jump set, or give the jump set a minimum dwell time; a trigger "
-                       "whose two sides are both zero fires for ever unless its inequality is strict.",
-                       at_once, name, t);
-    if (shrinking(history, &gap, &ratio)) {
+    remember(scales, history, t);
+    unsigned long long total = history->total, burst = history->burst;
+    if ((double)history->at_once > scales->jumps_at_once)
+        return too_many_at_once(engine, jump, history->at_once, t);
+    /* Times that are known are the author's own. */
+    if (engine->model->jumps[jump].kind == JUMP_ON_TIME)
+        return true;
+    if (shrinking(scales, history, &gap, &ratio)) {
         double rest = gap * ratio / (1.0 - ratio);
-        const ModelScales *scales = &engine->model->scales;
         if (rest <= fmax(scales->accumulation * history->shrinking_from, scales->resolved * time_ulp(t)))
             return problem(engine, ENDED_ZENO,
                            "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "

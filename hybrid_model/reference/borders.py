@@ -15,16 +15,13 @@ import numpy as np
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.errors import SimulationError
 from hybrid_model.reference.first_step import first_step
-from hybrid_model.scales import PROBE, moves, one_instant, usual_sizes
+from hybrid_model.scales import PROBE, REACH_AT, REACH_STEP, moves, one_instant, usual_sizes
 
 if TYPE_CHECKING:
     from hybrid_model.reference.execution import Execution
 
 ORDER = 7
 """Of the step that probes are a part of."""
-REACH_AT = (1e-3, 0.03, 0.3, 1.0)
-REACH_STEP = 1e-3
-"""Parts of a flow at which its rates are looked at, and of that time by which states are moved to see them turn."""
 
 
 def instant(execution: Execution, t: float) -> float:

@@ -97,10 +97,7 @@ class Execution:
         self.message = ""
         self.next_step: float | None = None
         self._left_flow_set = False
-        self._whole = np.repeat(
-            [place.variable.integer for place in self.layout.places[Kind.DISCRETE]],
-            [place.variable.size for place in self.layout.places[Kind.DISCRETE]],
-        ).astype(bool)
+        self._whole = np.array(self.layout.whole, dtype=bool)
         self.nominal = np.concatenate(
             [np.full(place.variable.size, place.variable.nominal or np.nan) for place in self.layout.places[Kind.STATE]]
             or [np.zeros(0)]
@@ -114,6 +111,7 @@ class Execution:
         """Give the computed states their start values, from parameters, inputs and the other states."""
         self.x, self.z = self.maps.start(self.t, self.x, self.z, self.inputs.at(self.t), self.p)
         self._require_finite("at the start")
+        self._require_whole("at the start")
         self.sizes = np.where(np.isnan(self.nominal), np.abs(self.x), self.nominal)
 
     def arrive(self, t: float, x: FloatArray) -> None:

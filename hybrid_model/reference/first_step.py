@@ -14,16 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hybrid_model.declare.variables import FloatArray
-from hybrid_model.scales import ulp
-
-PART = 0.01
-"""The Euler step moves the states by this part of their size."""
-BLIND = 1e-3
-"""Part of the flow that the Euler step is, where the states have no size yet."""
-GROWTH = 100.0
-"""The first step is at most this many times the Euler step."""
-LEAST = 64.0
-"""In ulp: the shortest first step."""
+from hybrid_model.scales import BLIND_PART, EULER_PART, FIRST_GROWTH, FIRST_LEAST, ulp
 
 
 def first_step(
@@ -59,17 +50,17 @@ def first_step(
         In s, not above ``end - t``.
     """
     whole = end - t
-    least = min(whole, LEAST * max(ulp(t), ulp(end) if math.isfinite(end) else 0.0))
+    least = min(whole, FIRST_LEAST * max(ulp(t), ulp(end) if math.isfinite(end) else 0.0))
     rates = rates_at(t, x)
     speed = float(np.abs(rates).max(initial=0.0))
     if not 0.0 < speed < math.inf:
-        return max(least, min(whole, BLIND * whole)) if math.isfinite(whole) else least
-    euler = PART * size / speed if size > 0.0 else BLIND * whole
+        return max(least, min(whole, BLIND_PART * whole)) if math.isfinite(whole) else least
+    euler = EULER_PART * size / speed if size > 0.0 else BLIND_PART * whole
     euler = max(least, min(euler, whole)) if math.isfinite(euler) else least
     turned = float(np.abs(rates_at(t + euler, x + euler * rates) - rates).max(initial=0.0)) / (speed * euler)
     if not math.isfinite(turned):
         return euler
     # The error of a step h is about speed h (turned h)^order; it is to be a hundredth of the tolerance.
-    allowed = PART * rtol * max(size, speed * euler) / speed
+    allowed = EULER_PART * rtol * max(size, speed * euler) / speed
     chosen = (allowed * turned) ** (1.0 / (order + 1)) / turned if turned > 0.0 else math.inf
-    return max(least, min(GROWTH * euler, chosen, whole))
+    return max(least, min(FIRST_GROWTH * euler, chosen, whole))

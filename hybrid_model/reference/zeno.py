@@ -1,4 +1,7 @@
-"""Zeno guard: recognise jumps that accumulate, and say when and why."""
+"""Zeno guard: recognise jumps that accumulate, and say when and why.
+
+The C engine of exported FMUs (hybrid_model/engine/zeno.c) decides in the same way.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,13 @@ import itertools
 import math
 import numbers
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
+from hybrid_model import scales
 from hybrid_model.errors import SimulationError
-from hybrid_model.scales import ACCUMULATION, CHATTER, CROWD, PAUSE, RESOLVED, ulp
+from hybrid_model.scales import ulp
 
-HISTORY = 12
 GAPS = 8
 """Ratios of successive gaps are compared over this many gaps: enough to tell geometric shrinking from chance."""
 
@@ -49,11 +52,11 @@ class ZenoGuard:
         If a count is not a whole number from 1 on, or another limit is negative or not finite.
     """
 
-    jumps_at_once: int = 1000
+    jumps_at_once: int = scales.JUMPS_AT_ONCE
     window: float | None = None
-    jumps_in_window: int = 100
+    jumps_in_window: int = scales.JUMPS_IN_WINDOW
     remainder: float | None = None
-    spread: float = 0.05
+    spread: float = scales.SPREAD
     max_jumps: int = 100_000
 
     def __post_init__(self) -> None:
@@ -75,6 +78,51 @@ def _finite(value: Any) -> bool:
     return isinstance(value, numbers.Real) and math.isfinite(value)
 
 
+@dataclass
+class _History:
+    """What is kept of the jumps of one name: their last times that differ, and what follows from all of them."""
+
+    times: deque[float] = field(default_factory=lambda: deque(maxlen=GAPS + 1))
+    total: int = 0
+    at_once: int = 0
+    longest: float = 0.0
+    shrinking_from: float = math.inf
+    burst: int = 0
+    burst_start: float = 0.0
+
+    def add(self, t: float, burst_size: int) -> None:
+        """Count a jump at time `t`; those at one instant count once among the gaps and bursts."""
+        self.total += 1
+        self.at_once += 1
+        if self.times and t == self.times[-1]:
+            return
+        self.at_once = 1
+        if self.times:
+            self._measure(t - self.times[-1])
+        self.times.append(t)
+        if self.burst == 0 or self.burst >= burst_size:
+            self.burst, self.burst_start = 0, t
+        self.burst += 1
+
+    def _measure(self, gap: float) -> None:
+        """Keep the longest gap since the last pause, and the first one of those that shrink."""
+        before = self.times[-1] - self.times[-2] if len(self.times) > 1 else 0.0
+        after_pause = gap < scales.PAUSE * before
+        self.longest = gap if after_pause else max(self.longest, gap)
+        if after_pause or not gap < before:
+            self.shrinking_from = gap
+
+    def shrinking(self, spread: float) -> tuple[float, float] | None:
+        """Return the last gap and the ratio of those before it, if the last ones shrink like a geometric sequence."""
+        if len(self.times) <= GAPS:
+            return None
+        gaps = [b - a for a, b in itertools.pairwise(self.times)]
+        ratios = [b / a for a, b in itertools.pairwise(gaps)]
+        if max(ratios) >= 1.0 or max(ratios) - min(ratios) > spread * ratios[-1]:
+            return None
+        return gaps[-1], ratios[-1]
+
+
 class ZenoMonitor:
     """Watches the jumps of one run.
 
@@ -86,11 +134,7 @@ class ZenoMonitor:
 
     def __init__(self, guard: ZenoGuard) -> None:
         self.guard = guard
-        self._recent: dict[str, deque[float]] = {}
-        self._total: dict[str, int] = {}
-        self._at_once: dict[str, tuple[float, int]] = {}
-        self._longest: dict[str, float] = {}
-        self._shrinking_from: dict[str, float] = {}
+        self._histories: dict[str, _History] = {}
 
     def record(self, automaton: str, jump: str, t: float, *, on_state: bool = True) -> str | None:
         """Count a jump at time `t`.
@@ -109,77 +153,50 @@ class ZenoMonitor:
         str or None
             The message, if the run must end.
         """
-        self._total[jump] = self._total.get(jump, 0) + 1
-        last, count = self._at_once.get(jump, (t, 0))
-        count = count + 1 if t == last else 1
-        self._at_once[jump] = (t, count)
-        if count > self.guard.jumps_at_once and not on_state:
-            return (
-                f"{automaton}: {count} jumps of {jump!r} at one instant, t = {t:.9g} s: its time is still not after "
-                "the present. Let the jump map move the time on past it; where a run starts later than its clock, "
-                "declare the clock's state with computed=True and let start_map give the next time to come."
-            )
-        if count > self.guard.jumps_at_once:
-            return (
-                f"{automaton}: {count} jumps of {jump!r} at one instant, t = {t:.9g} s: after the jump the state is "
-                "still in the jump set. Make the jump map leave the jump set, or let the margin be negative there "
-                "(a threshold that is zero together with its error fires for ever; so does a set given as 0 outside "
-                "and 1 inside, because zero is inside)."
-            )
+        history = self._histories.setdefault(jump, _History())
+        history.add(t, self.guard.jumps_in_window)
+        if history.at_once > self.guard.jumps_at_once:
+            remedy = _STILL_ENABLED if on_state else _STILL_DUE
+            return f"{automaton}: {history.at_once} jumps of {jump!r} at one instant, t = {t:.9g} s: {remedy}"
         if not on_state:
             return None
-        recent = self._recent.setdefault(jump, deque(maxlen=max(HISTORY, self.guard.jumps_in_window)))
-        self._measure(jump, recent, t)
-        recent.append(t)
-        return self._crowded(automaton, jump, recent) or self._geometric(automaton, jump, recent)
+        why = self._geometric(jump, history, t) or self._crowded(jump, history, t)
+        return why and f"{automaton}: {why}"
 
-    def _measure(self, jump: str, recent: deque[float], t: float) -> None:
-        """Keep the longest gap between jumps of a name, and the first one of those that shrink."""
-        if not recent or t == recent[-1]:
-            return
-        gap = t - recent[-1]
-        before = recent[-1] - recent[-2] if len(recent) > 1 else math.inf
-        after_pause = gap < PAUSE * before
-        self._longest[jump] = gap if after_pause else max(self._longest.get(jump, 0.0), gap)
-        if after_pause or not gap < before:
-            self._shrinking_from[jump] = gap
-        self._shrinking_from.setdefault(jump, gap)
-
-    def _crowded(self, automaton: str, jump: str, recent: deque[float]) -> str | None:
-        n = self.guard.jumps_in_window
-        if len(recent) < n or recent[-1] == recent[-n]:
-            return None  # a cascade at one instant has its own, larger budget
-        span = recent[-1] - recent[-n]
-        if self.guard.window is not None:
-            crowded = span <= self.guard.window
-        else:
-            crowded = span <= max(CROWD * self._longest[jump], n * CHATTER * ulp(recent[-1]))
-        if not crowded:
+    def _geometric(self, jump: str, history: _History, t: float) -> str | None:
+        shrinking = history.shrinking(self.guard.spread)
+        if shrinking is None:
             return None
-        return (
-            f"{automaton}: {n} jumps of {jump!r} in {recent[-1] - recent[-n]:.2g} s around t = {recent[-1]:.12g} s: "
-            "jumps accumulate there. End the run before, or give the jump set a minimum dwell time."
-        )
-
-    def _geometric(self, automaton: str, jump: str, recent: deque[float]) -> str | None:
-        if len(recent) < GAPS + 1:
-            return None
-        times = list(recent)[-(GAPS + 1) :]
-        gaps = [b - a for a, b in itertools.pairwise(times)]
-        if min(gaps) <= 0.0:
-            return None
-        ratios = [b / a for a, b in itertools.pairwise(gaps)]
-        ratio = ratios[-1]
-        if max(ratios) >= 1.0 or max(ratios) - min(ratios) > self.guard.spread * ratio:
-            return None
-        left = gaps[-1] * ratio / (1.0 - ratio)
-        remainder = self.guard.remainder
+        gap, ratio = shrinking
+        left, remainder = gap * ratio / (1.0 - ratio), self.guard.remainder
         if remainder is None:
-            remainder = ACCUMULATION * self._shrinking_from[jump]
-        if left > max(remainder, RESOLVED * ulp(times[-1])):
+            remainder = scales.ACCUMULATION * history.shrinking_from
+        if left > max(remainder, scales.RESOLVED * ulp(t)):
             return None
         return (
-            f"{automaton}: {self._total[jump]} jumps of {jump!r} accumulate at t = {times[-1] + left:.12g} s (the last "
-            f"gap was {gaps[-1]:.2g} s, each {ratio:.3f} times the one before). End the run before that time, or give "
-            "the jump set a minimum dwell time."
+            f"{history.total} jumps of {jump!r} accumulate at t = {t + left:.12g} s (the last gap was {gap:.2g} s, "
+            f"each {ratio:.3f} times the one before). End the run before that time, or give the jump set a minimum "
+            "dwell time."
         )
+
+    def _crowded(self, jump: str, history: _History, t: float) -> str | None:
+        n, span, window = self.guard.jumps_in_window, t - history.burst_start, self.guard.window
+        if window is None:
+            window = max(scales.CROWD * history.longest, n * scales.CHATTER * ulp(t))
+        if history.burst < n or span > window:
+            return None
+        return (
+            f"{n} jumps of {jump!r} in {span:.2g} s around t = {t:.12g} s: jumps accumulate there. End the run before, "
+            "or give the jump set a minimum dwell time."
+        )
+
+
+_STILL_DUE = (
+    "its time is still not after the present. Let the jump map move the time on past it; where a run starts later than "
+    "its clock, declare the clock's state with computed=True and let start_map give the next time to come."
+)
+_STILL_ENABLED = (
+    "after the jump the state is still in the jump set. Make the jump map leave the jump set, or let the margin be "
+    "negative there (a threshold that is zero together with its error fires for ever; so does a set given as 0 outside "
+    "and 1 inside, because zero is inside)."
+)
