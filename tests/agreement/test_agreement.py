@@ -12,6 +12,7 @@ import pkgutil
 import numpy as np
 import pytest
 from catalogue import cases
+from executions import reference, shown, starts
 from own_importer import exchange, step_through
 
 import hybrid_model as hm
@@ -21,7 +22,6 @@ from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
 from hybrid_model import consensus
-from hybrid_model.declare.variables import Kind, element_names
 
 # The issue's limits: times of events, and states.
 TIME_TOLERANCE = 1e-7
@@ -65,38 +65,6 @@ class StepSource(hm.HybridAutomaton):
     transitions = (hm.TimeEvent("step", next_time, move_on),)
 
 
-def starts(automaton):
-    return {
-        name: float(value)
-        for variable in automaton.variables
-        for name, value in zip(element_names(variable), variable.start.ravel(), strict=True)
-    }
-
-
-def step_inputs(case):
-    """The inputs of a case as signals with breakpoints."""
-    inputs = {}
-    for variable in case.automaton.of_kind(Kind.INPUT):
-        elements = element_names(variable)
-        if any(name in case.steps for name in elements):
-            breakpoints = sorted({t for name in elements for t, _ in case.steps.get(name, ())})
-            inputs[variable.name] = hm.Signal(lambda t, v=variable: step_values(case, v, t), breakpoints)
-    return inputs
-
-
-def python_run(case):
-    """The reference."""
-    return hm.simulate(case.automaton, case.t_end, inputs=step_inputs(case))
-
-
-def step_values(case, variable, t):
-    start = starts(case.automaton)
-    values = []
-    for name in element_names(variable):
-        values.append([start[name], *(value for time, value in case.steps.get(name, ()) if time <= t)][-1])
-    return np.reshape(values, variable.shape)
-
-
 def cosimulate(case, slave):
     sources, wires = [], {}
     for k, (name, steps) in enumerate(case.steps.items()):
@@ -123,29 +91,17 @@ def compare(case, arc, result):
         np.testing.assert_allclose(result.signals[f"block.{name}"], values, rtol=0, atol=STATE_TOLERANCE, err_msg=name)
 
 
-@pytest.fixture(scope="module")
-def references():
-    runs = {}
-
-    def reference(name, case):
-        if name not in runs:
-            runs[name] = python_run(case)
-        return runs[name]
-
-    return reference
-
-
 @pytest.mark.parametrize("name", list(cases()))
-def test_in_process_cosimulation_agrees_with_python_run(name, references):
+def test_in_process_cosimulation_agrees_with_python_run(name):
     case = cases()[name]
-    compare(case, references(name, case), cosimulate(case, AutomatonSlave("block", case.automaton)))
+    compare(case, reference(name), cosimulate(case, AutomatonSlave("block", case.automaton)))
 
 
 @pytest.mark.parametrize("name", list(cases()))
-def test_fmu_cosimulation_agrees_with_python_run(name, references, exported):
+def test_fmu_cosimulation_agrees_with_python_run(name, exported):
     case = cases()[name]
     slave = FmuSlave("block", exported(case.automaton, name))
-    compare(case, references(name, case), cosimulate(case, slave))
+    compare(case, reference(name), cosimulate(case, slave))
 
 
 # What importers of FMI 2.0 and of Model Exchange do: there are no clocks, so the log tells the jumps.
@@ -154,13 +110,6 @@ def test_fmu_cosimulation_agrees_with_python_run(name, references, exported):
 def points(case):
     """The output times."""
     return [*(k * (case.t_end / (SAMPLES - 1)) for k in range(SAMPLES - 1)), case.t_end]
-
-
-def shown(automaton):
-    """The scalars that an FMU shows of states, discrete states and outputs."""
-    kinds = (Kind.STATE, Kind.DISCRETE, Kind.OUTPUT)
-    kept = [variable for kind in kinds for variable in automaton.of_kind(kind) if not variable.internal]
-    return [name for variable in kept for name in element_names(variable)]
 
 
 def compare_run(case, arc, run, *, without=()):
@@ -180,30 +129,30 @@ def compare_run(case, arc, run, *, without=()):
 
 
 @pytest.mark.parametrize("name", list(cases()))
-def test_model_exchange_agrees_with_python_run(name, references, exported):
-    model_exchange(name, "3.0", references, exported)
+def test_model_exchange_agrees_with_python_run(name, exported):
+    model_exchange(name, "3.0", exported)
 
 
 @pytest.mark.parametrize("name", fmi2_cases())
-def test_fmi2_model_exchange_agrees_with_python_run(name, references, exported):
-    model_exchange(name, "2.0", references, exported)
+def test_fmi2_model_exchange_agrees_with_python_run(name, exported):
+    model_exchange(name, "2.0", exported)
 
 
-def model_exchange(name, fmi, references, exported):
+def model_exchange(name, fmi, exported):
     case = cases()[name]
     path = exported(case.automaton, name, fmi)
     run = exchange(path, case.t_end, points(case), steps=case.steps, names=shown(case.automaton))
-    compare_run(case, references(name, case), run)
+    compare_run(case, reference(name), run)
 
 
 @pytest.mark.parametrize("name", fmi2_cases())
-def test_fmi2_cosimulation_agrees_with_python_run(name, references, exported):
+def test_fmi2_cosimulation_agrees_with_python_run(name, exported):
     """Inputs change at communication points, and what they bring about is seen after the next step."""
     case = cases()[name]
     path = exported(case.automaton, name, "2.0")
     run = step_through(path, case.t_end, points(case), steps=case.steps, names=shown(case.automaton))
     changed = {t for steps in case.steps.values() for t, _ in steps}
-    compare_run(case, references(name, case), run, without=changed)
+    compare_run(case, reference(name), run, without=changed)
 
 
 def test_catalogue_is_complete():
@@ -218,7 +167,7 @@ def test_catalogue_is_complete():
     for case in cases().values():
         collect(case.automaton)
     models = {getattr(hm.models, name) for name in hm.models.__all__}
-    for found in pkgutil.iter_modules(consensus.__path__, "hybrid_model.consensus."):
+    for found in pkgutil.walk_packages(consensus.__path__, "hybrid_model.consensus."):
         own = [item for item in vars(importlib.import_module(found.name)).values() if isinstance(item, type)]
         models |= {item for item in own if issubclass(item, hm.HybridAutomaton) and item.__module__ == found.name}
     bases = {base for part in parts for base in part.__mro__[1:]}

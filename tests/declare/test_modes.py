@@ -53,9 +53,9 @@ def test_the_lowering_is_the_form_c_f_d_g():
     # Guards: "turn off" belongs to the other mode, so its margin is negative whatever the temperature.
     assert automaton.jump_margins(s) == [-0.5, -1.5]
     assert automaton.reset(1, s) == {"mode": 1}
-    assert [(variable.name, variable.integer) for variable in automaton.of_kind(hm.variables.Kind.DISCRETE)] == [
-        ("mode", True)
-    ]
+    assert [
+        (variable.name, variable.integer) for variable in automaton.of_kind(hm.declare.variables.Kind.DISCRETE)
+    ] == [("mode", True)]
 
 
 def test_traced_it_chooses_among_all_modes_what_a_run_evaluates_in_one():

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from catalogue import cases
-from test_agreement import python_run, shown
+from executions import reference, shown
 
 import hybrid_model as hm
 from cosim.consensus import fmu_system
@@ -75,7 +75,7 @@ def test_models_without_inputs_are_the_python_run(name, fmi, exported, simulate)
     case = cases()[name]
     step = case.t_end / 50
     simulation = simulate({"block": exported(case.automaton, name, fmi, clocks=False)}, step)
-    arc = python_run(case)
+    arc = reference(name)
     jumps = np.array([jump.t for jump in arc.jumps])
     integers = {v.name for v in case.automaton.variables if v.integer}
     for _ in range(50):

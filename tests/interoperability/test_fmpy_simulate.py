@@ -9,7 +9,7 @@ import fmpy
 import numpy as np
 import pytest
 from catalogue import cases
-from test_agreement import python_run, shown, step_values
+from executions import reference, shown, step_values
 
 import hybrid_model as hm
 from hybrid_model.declare.variables import Kind, element_names
@@ -87,7 +87,7 @@ def test_fmpy_gives_the_python_run(name, way, exported):
     path = exported(case.automaton, name, fmi)
     outputs = outputs_of(path, case)
     result = simulate(path, case, outputs, kind, options)
-    arc = python_run(case)
+    arc = reference(name)
     breaks = [jump.t for jump in arc.jumps] + [t for steps in case.steps.values() for t, _ in steps]
     # At an instant with a jump there is a row for each side; which row is which is fmpy's affair.
     kept = [row for row in result if not breaks or np.min(np.abs(np.array(breaks) - row["time"])) > 2 * TIMES[kind]]
@@ -108,7 +108,7 @@ def test_fmpy_stops_at_each_event(name, way, exported):
     path = exported(case.automaton, name, fmi)
     result = simulate(path, case, outputs_of(path, case), kind, options)
     found = np.unique([a for a, b in itertools.pairwise(result["time"]) if a == b])
-    for jump in python_run(case).jumps:
+    for jump in reference(name).jumps:
         if not case.automaton.jumps[jump.index].internal and 0.0 < jump.t < case.t_end:
             assert np.min(np.abs(found - jump.t)) < TIMES[kind], jump
 

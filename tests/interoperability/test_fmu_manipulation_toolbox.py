@@ -8,7 +8,7 @@ import fmpy
 import numpy as np
 import pytest
 from catalogue import cases
-from test_agreement import python_run, shown
+from executions import reference, shown
 
 import hybrid_model as hm
 from fmu.export import export_fmu
@@ -101,7 +101,7 @@ def test_models_in_a_container_are_the_python_run(name, fmi, exported, tmp_path)
     made.add_implicit_rule()
     step = case.t_end / 40
     found = run(made, tmp_path / "container.fmu", case.t_end, step, shown(case.automaton))
-    arc = python_run(case)
+    arc = reference(name)
     away = np.min(np.abs(found["time"][:, None] - [jump.t for jump in arc.jumps]), axis=1) > 1e-9
     times = np.minimum(found["time"], arc.t[-1])
     for variable in shown(case.automaton):

@@ -4,7 +4,7 @@ import fmpy
 import numpy as np
 import pytest
 from catalogue import cases
-from test_agreement import python_run, shown
+from executions import reference, shown
 
 import hybrid_model as hm
 
@@ -38,7 +38,7 @@ def test_cosimulation_is_the_python_run_after_reset_too(name, fmi, exported):
     case = cases()[name]
     path = exported(case.automaton, name, fmi)
     found, variables = description(path)
-    arc = python_run(case)
+    arc = reference(name)
     step = case.t_end / 40
     with loaded(path, fmi, found) as slave:
         for again in (False, True):
@@ -73,7 +73,7 @@ def test_event_mode_with_early_return_gives_the_times_of_the_python_run(name, ex
     case = cases()[name]
     path = exported(case.automaton, name)
     found, _ = description(path)
-    arc = python_run(case)
+    arc = reference(name)
     events = []
     with loaded(path, "3.0", found) as slave:
         slave.instantiate_co_simulation(

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from catalogue import cases
-from test_agreement import python_run
+from executions import reference
 
 import hybrid_model as hm
 from hybrid_model.models import BouncingBall
@@ -70,7 +70,7 @@ def test_models_without_inputs_are_the_python_run(name, exported):
     case = cases()[name]
     step = case.t_end / 50
     simulation = Simulation({"block": exported(case.automaton, name, "2.0")}, step)
-    arc = python_run(case)
+    arc = reference(name)
     outputs = [v.name for v in case.automaton.variables if v.output and v.shape == ()]
     assert outputs
     jumps = np.array([jump.t for jump in arc.jumps])

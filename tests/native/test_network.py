@@ -224,7 +224,7 @@ def test_a_consensus_network_is_one_group_and_sparse():
     assert len(traced.groups) == 1
     assert traced.order.calls == ()
     pattern = traced.pattern("flow", "z").toarray()
-    names = traced.layout.names(hm.variables.Kind.DISCRETE)
+    names = traced.layout.names(hm.declare.variables.Kind.DISCRETE)
     wires = {f"agent{k}": {f"agent{k}.broadcast"} for k in range(1, 31)}
     for wire in composition.wires:
         wires[wire.target].add(f"{wire.source}.broadcast")

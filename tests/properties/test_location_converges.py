@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import catalogue
 import numpy as np
 import pytest
-import test_agreement as agreement
+from executions import step_inputs
 from models import test_boost_converter as boost
 from models import test_event_triggered_lti_loop as triggered
 from models import test_fireflies as fireflies
@@ -182,7 +182,7 @@ def library_cases():
 def test_on_every_library_model_event_times_converge(name):
     """The run at default tolerances is held to exact times by the model's own tests; coarser runs tend to it."""
     case = library_cases()[name]
-    automaton, inputs = compiled(case.automaton), agreement.step_inputs(case)
+    automaton, inputs = compiled(case.automaton), step_inputs(case)
     exact = hm.simulate(automaton, case.t_end, inputs=inputs).jumps
     for rtol in (1e-5, 1e-7, 1e-9, 1e-11):
         solver = hm.Solver(rtol=rtol, atol=rtol / 100)

@@ -7,9 +7,9 @@ import zipfile
 import numpy as np
 import pytest
 from catalogue import cases
+from executions import reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_agreement import python_run
 from test_arc_parts import Switched
 
 import hybrid_model as hm
@@ -80,7 +80,7 @@ def assert_close_between(arc, back, grid):
 
 @pytest.mark.parametrize("name", ["bouncing_ball", "thermostat", "integrator", "gated_sine", "boost_converter"])
 def test_a_loaded_arc_answers_as_the_saved_one(name, again):
-    arc = python_run(cases()[name])
+    arc = reference(name)
     back = again(arc)
     assert_same(arc, back)
     assert_close_between(arc, back, np.linspace(arc.t[0], arc.t[-1], 501))
@@ -89,7 +89,7 @@ def test_a_loaded_arc_answers_as_the_saved_one(name, again):
 @pytest.mark.long
 @pytest.mark.parametrize("name", cases())
 def test_every_model_is_saved_and_loaded(name, again):
-    arc = python_run(cases()[name])
+    arc = reference(name)
     back = again(arc)
     assert_same(arc, back)
     assert_close_between(arc, back, np.linspace(arc.t[0], arc.t[-1], 501))

@@ -84,13 +84,13 @@ def test_symmetric_agents_fire_together_in_the_order_of_the_parts():
 
 def cost_per_event(network, t_end, monkeypatch):
     evaluations = [0]
-    rates = hm.vector_form.VectorForm.rates
+    rates = hm.declare.vector_form.VectorForm.rates
 
     def counted(self, *arguments):
         evaluations[0] += 1
         return rates(self, *arguments)
 
-    monkeypatch.setattr(hm.vector_form.VectorForm, "rates", counted)
+    monkeypatch.setattr(hm.declare.vector_form.VectorForm, "rates", counted)
     run = hm.simulate_network(network, t_end)
     monkeypatch.undo()
     return evaluations[0] / len(run.jumps)

@@ -1,6 +1,8 @@
 """Every model of the repository, with the run that the three executions must agree on."""
 
+import functools
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import control
 import numpy as np
@@ -25,6 +27,7 @@ class Case:
     steps: dict = field(default_factory=dict)
 
 
+@functools.cache
 def cases():
     """All cases by name; `test_catalogue_is_complete` sees to it that no model is missing."""
     paper = load_scenario("paper-a")
@@ -64,7 +67,7 @@ def cases():
             20.0,
             {"neighbours[1]": ((2.0, 1.3), (7.5, 0.9)), "neighbours[2]": ((3.0, 0.6), (11.0, 1.0))},
         )
-    return found
+    return MappingProxyType(found)
 
 
 def process_cases():

@@ -9,11 +9,11 @@ import fmpy.util
 import numpy as np
 import pytest
 from catalogue import cases
+from executions import python_run
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from small_automata import Corridor, PatientCorridor, Timer
-from test_agreement import python_run
 
 import hybrid_model as hm
 from cosim.cli.main import main

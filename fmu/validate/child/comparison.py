@@ -20,7 +20,7 @@ _FORMS = {"Real": "d", "Float64": "d", "Float32": "f"}
 def compare(fmu: Any, rule: str, when: str, expected: Whole, found: Whole) -> None:
     """Report the first difference; a small one as a warning, for users of the state hardly meet it."""
     # The importer holds the time, and gives it.
-    readable = [variable for variable in fmu.describe.variables if variable.readable]
+    readable = [variable for variable in fmu.variables if variable.readable]
     rows = [
         (v, *pair) for v, *pair in zip(readable, expected[0], found[0], strict=True) if v.causality != "independent"
     ]

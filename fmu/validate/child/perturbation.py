@@ -41,7 +41,7 @@ def moved_starts(fmu: Any, recorder: Recorder) -> None:
     """In Initialization Mode start values are moved one by one; no unknown may follow that leaves them out."""
     fmu.lenient = True  # not each FMU computes there
     instantiate(fmu, recorder)
-    for variable in fmu.describe.variables:
+    for variable in fmu.variables:
         if variable.start is not None:
             fmu.set(variable)
     fmu.enter_initialization()

@@ -25,7 +25,7 @@ class Run:
         self.t = float(self.plan["start"])
         self.next_time: float | None = None
         self.ended = False
-        self.readable = [v for v in fmu.describe.variables if v.readable]
+        self.readable = [v for v in fmu.variables if v.readable]
         self.outputs = [v for v in self.readable if v.causality == "output"][:OUTPUTS]
         self._nan: set[str] = set()
 

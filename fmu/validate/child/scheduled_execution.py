@@ -13,9 +13,7 @@ class ScheduledExecution(Run):
 
     def __init__(self, fmu: Any, recorder: Recorder) -> None:
         super().__init__(fmu, recorder)
-        self.clocks: list[Variable] = [
-            v for v in fmu.describe.variables if v.type == "Clock" and v.causality == "input"
-        ]
+        self.clocks: list[Variable] = [v for v in fmu.variables if v.type == "Clock" and v.causality == "input"]
         self.passed = 0
 
     def begin(self) -> None:
