@@ -10,8 +10,8 @@ from typing import Any
 
 import hybrid_model as hm
 from cosim.cli.exits import Exit, UsageError, exit_of, progress
-from hybrid_model.consensus.certificates.bound_table import Certified
 from hybrid_model.consensus.certificates.certify import Certificates, certify
+from hybrid_model.consensus.certificates.forms import Certified
 from hybrid_model.consensus.figures.certificates import save_certificate_figures
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import load_scenario

@@ -19,7 +19,7 @@ from cosim.result import CosimResult
 from fmu.describe.variables import Fmi
 from fmu.export import export_fmu
 from hybrid_model.consensus.certificates.certify import Certificates, certify
-from hybrid_model.consensus.certificates.rates import BoundForm, ConvergenceBound, convergence_bound
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound, convergence_bound
 from hybrid_model.consensus.figures.run import save_paper_figures
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop, scenario_agents
 from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report

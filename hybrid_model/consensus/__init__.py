@@ -5,17 +5,16 @@ interactions: an event-triggered approach" ("the paper" in this package). What h
 instead, is in docs/paper-audit.md; "audit" with the number of a section means that page.
 """
 
-from hybrid_model.consensus.certificates.bound_table import Certified
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.edge_comparison import EdgeComparison, compare_edge_domain
-from hybrid_model.consensus.certificates.rates import BoundForm, ConvergenceBound, convergence_bound
+from hybrid_model.consensus.certificates.forms import Certified
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound, convergence_bound
 from hybrid_model.consensus.certificates.windows import BestWindow, RateForm, best_window
-from hybrid_model.consensus.exact.edge_domain import edge_domain_system
-from hybrid_model.consensus.exact.edge_gains import EdgeGains, edge_domain_gains
+from hybrid_model.consensus.exact.edge_domain import EdgeGains, edge_domain_gains, edge_domain_system
 from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum
 from hybrid_model.consensus.exact.periodic_edge_domain import PeriodicGains, period_map, periodic_gains
-from hybrid_model.consensus.excitation.constants import ExcitationConstants, WindowExtremes, scenario_excitation
 from hybrid_model.consensus.excitation.joint import JointExcitation, joint_excitation, tree_excitations
+from hybrid_model.consensus.excitation.persistence import ExcitationConstants, WindowExtremes, scenario_excitation
 from hybrid_model.consensus.graphs.digraphs import BalancedSwitching
 from hybrid_model.consensus.graphs.generators import (
     AgentGraph,

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from hybrid_model.consensus.certificates.analysis import connected_parts
+from hybrid_model.consensus.certificates.components import connected_components
 from hybrid_model.consensus.graphs.generators import (
     complete_graph,
     erdos_renyi_graph,
@@ -32,7 +32,7 @@ def drawn_scenario(random, most_agents, *, weights=None, switching=None, stop_ti
     while True:
         scenario = read_scenario(drawn_entries(random, most_agents, weights, switching, stop_time))
         period = scenario.edge_weights.period
-        if len(connected_parts(scenario, stop_time if period is None else period or 1.0)) == 1:
+        if len(connected_components(scenario, stop_time if period is None else period or 1.0)) == 1:
             return scenario
 
 

@@ -8,26 +8,24 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from hybrid_model.consensus.certificates.rates import default_window
+from hybrid_model.consensus.certificates.components import active_edges, connected_components
+from hybrid_model.consensus.certificates.rates import tree_free_contraction
+from hybrid_model.consensus.certificates.tree_bound import default_window
 from hybrid_model.consensus.certificates.windows import RateForm, best_window
 from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum
 from hybrid_model.consensus.exact.reachable_sets import ReachableSets
-from hybrid_model.consensus.exact.transition_grid import FlowCells, affordable_resolution, flow_cells
+from hybrid_model.consensus.exact.transition_grid import TransitionGrid, affordable_resolution, transition_grid
 from hybrid_model.consensus.exact.worst_case import WorstCase, worst_case
-from hybrid_model.consensus.excitation.constants import ExcitationConstants, Signal, scenario_excitation
+from hybrid_model.consensus.excitation.persistence import ExcitationConstants, Signal, scenario_excitation
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.scenario.definition import Scenario
 
-__all__ = ["Analysis", "active_edges", "analyse", "connected_parts"]
-
-_SPREAD = 1e-12
-"""Share of the largest integral below which an edge's integral counts as zero (rounding)."""
+__all__ = ["Analysis", "analyse"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +137,11 @@ class Analysis:
     def _contractions(self) -> dict[int, float]:
         return {}
 
+    @property
+    def improved_contraction(self) -> float:
+        """gamma* over the window: the share of ``||xi||^2`` that is lost at the least (audit, section 3 (ii))."""
+        return tree_free_contraction(self.disagreement, self.scenario.network.gain)
+
     @cached_property
     def initial_disagreement(self) -> NDArray[np.float64]:
         """``xi(0)``, shape (n - 1,)."""
@@ -169,10 +172,10 @@ class Analysis:
         return largest
 
     @cached_property
-    def cells(self) -> FlowCells:
+    def cells(self) -> TransitionGrid:
         """The flow over one cycle from t = 0, on a coarse grid."""
         resolution = affordable_resolution(self.scenario, 0.0, self.cycle, max(self.resolution, 0.02), 6000)
-        return flow_cells(self.scenario, 0.0, self.cycle, resolution)
+        return transition_grid(self.scenario, 0.0, self.cycle, resolution)
 
     def moved_degrees(self) -> NDArray[np.intp]:
         """Number of edges of each agent that ever carry weight, shape (n,)."""
@@ -190,20 +193,6 @@ def _largest(value: Callable[[Any], Any], start: float, end: float) -> float:
     bounds = (times[max(best - 1, 0)], times[min(best + 1, 64)])
     refined = minimize_scalar(lambda t: -float(value(t)), bounds=bounds, method="bounded", options={"xatol": 1e-12})
     return max(float(heights[best]), -float(refined.fun))
-
-
-def active_edges(scenario: Scenario, cycle: float) -> list[int]:
-    """Indices, from 0, of the listed edges whose weight has a positive integral over ``[0, cycle]`` [s]."""
-    doses = scenario.edge_weights.integral(0.0, cycle)
-    return [int(edge) for edge in np.flatnonzero(doses > _SPREAD * float(np.max(doses, initial=0.0)))]
-
-
-def connected_parts(scenario: Scenario, cycle: float) -> list[list[int]]:
-    """Agents, from 1, of each connected part of the union of the graphs over ``[0, cycle]`` [s]."""
-    graph: nx.Graph[int] = nx.Graph()
-    graph.add_nodes_from(range(1, scenario.network.agents + 1))
-    graph.add_edges_from(scenario.network.edges[edge] for edge in active_edges(scenario, cycle))
-    return sorted(sorted(part) for part in nx.connected_components(graph))
 
 
 def analyse(
@@ -224,7 +213,7 @@ def analyse(
     period = scenario.edge_weights.period
     cycle = scenario.stop_time if period is None else period or 1.0
     if tree is None:
-        parts = connected_parts(scenario, cycle)
+        parts = connected_components(scenario, cycle)
         if len(parts) > 1:
             raise ValueError(f"the edges that carry weight join only the agents {parts} among each other, not all.")
         active = active_edges(scenario, cycle)

@@ -12,15 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid_model.consensus.certificates.analysis import Analysis
-from hybrid_model.consensus.certificates.energy import energy_radius, improved_contraction, initial_peaks
+from hybrid_model.consensus.certificates.energy import energy_radius, initial_peaks
 from hybrid_model.consensus.certificates.envelopes import Envelope, envelope, sampled_threshold
 from hybrid_model.consensus.certificates.gaps import excited_gap, frozen_gap, growing_gap, printed_gap
-from hybrid_model.consensus.certificates.rates import (
-    BoundForm,
-    ConvergenceBound,
-    convergence_bound,
-    rate_of_contraction,
-)
+from hybrid_model.consensus.certificates.rates import rate_of_contraction
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound, convergence_bound
 from hybrid_model.consensus.exact.worst_case import WorstCase
 from hybrid_model.consensus.graphs.undirected import incidence
 from hybrid_model.consensus.scenario.definition import Scenario
@@ -72,7 +68,7 @@ class Bounds:
     @cached_property
     def improved_rate(self) -> float:
         """Rate [1/s] of the tree-free gamma* (audit, section 3 (ii)); 0.0 without persistent excitation."""
-        return rate_of_contraction(improved_contraction(self.analysis), self.analysis.window)
+        return rate_of_contraction(self.analysis.improved_contraction, self.analysis.window)
 
     @cached_property
     def floquet_rate(self) -> float | None:
@@ -166,7 +162,7 @@ class Bounds:
     def printed_radius(self) -> float | None:
         """``rho kappa_2`` as printed; None unless beta is below the printed rate."""
         bound = self.printed
-        return None if bound.kappa2 is None else bound.edge_factor * bound.kappa2
+        return None if bound.kappa2 is None else bound.rho * bound.kappa2
 
     @property
     def valid_radius(self) -> float | None:
@@ -177,12 +173,12 @@ class Bounds:
         bound = self._part_bound(1.0, decay)
         if bound.kappa2 is None or decay >= bound.rate:
             return None
-        return bound.edge_factor * bound.kappa2
+        return bound.rho * bound.kappa2
 
     @property
     def improved_radius(self) -> float | None:
         """``c c_n k nubar e^{beta T}/(1 - e^{beta T} sqrt q)`` with ``q = 1 - gamma*`` (audit, end of section 5.2)."""
-        analysis, root = self.analysis, math.sqrt(1 - improved_contraction(self.analysis))
+        analysis, root = self.analysis, math.sqrt(1 - self.analysis.improved_contraction)
         strength = analysis.edge_gain * analysis.box_gain * analysis.scenario.network.gain
 
         def part(decay: float) -> float | None:
@@ -239,7 +235,7 @@ class Bounds:
         """``k rho omega ||D||`` [1/s] of the printed gap."""
         network = self.analysis.scenario.network
         norm = float(np.linalg.norm(incidence(network.agents, network.underlying_edges), 2))
-        return network.gain * self.printed.edge_factor * float(np.max(self.analysis.largest_weights)) * norm
+        return network.gain * self.printed.rho * float(np.max(self.analysis.largest_weights)) * norm
 
     @property
     def valid_gap(self) -> float | None:
@@ -292,7 +288,7 @@ class Bounds:
         if bound.kappa1 is None or bound.kappa2 is None or decay >= bound.rate:
             return None
         start = max(bound.kappa1, 0.0) if with_initial else 0.0
-        speeds = self._speeds_by_degree(bound.edge_factor * (start + bound.kappa2), c)
+        speeds = self._speeds_by_degree(bound.rho * (start + bound.kappa2), c)
         return frozen_gap(c if threshold is None else threshold, decay, float(np.max(speeds)))
 
     def _improved_part_gap(
@@ -308,7 +304,7 @@ class Bounds:
         bound = self._part_bound(c, decay)
         if bound.kappa1 is not None and bound.kappa2 is not None and decay < bound.rate:
             start = max(bound.kappa1, 0.0) if with_initial else 0.0
-            radius = min(radius, bound.edge_factor * (start + bound.kappa2))
+            radius = min(radius, bound.rho * (start + bound.kappa2))
         reached = worst.cover * np.array([worst.pairs[edge] for edge in network.edges])
         widths = np.minimum(c * reached + pairs, radius)
         by_degree = self._speeds_by_degree(radius, c)

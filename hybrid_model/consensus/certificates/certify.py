@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybrid_model import HybridArc, Stop
-from hybrid_model.consensus.certificates.analysis import analyse, connected_parts
-from hybrid_model.consensus.certificates.bound_table import FORMS, Certified, certified_values
+from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
-from hybrid_model.consensus.certificates.certify_notes import scenario_notes
+from hybrid_model.consensus.certificates.components import component_scenarios, connected_components
+from hybrid_model.consensus.certificates.forms import FORMS, Certified, certified_values
 from hybrid_model.consensus.certificates.hypotheses import Hypothesis, bound_hypotheses, network_hypotheses
-from hybrid_model.consensus.certificates.observed import observe
-from hybrid_model.consensus.certificates.parts import part_scenarios
+from hybrid_model.consensus.certificates.notes import scenario_notes
+from hybrid_model.consensus.certificates.observation import observe
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.definition import Scenario
@@ -92,7 +92,7 @@ def certify(
     period = scenario.edge_weights.period
     cycle = scenario.stop_time if period is None else period or 1.0
     general = network_hypotheses(scenario, cycle)
-    if len(connected_parts(scenario, cycle)) > 1:
+    if len(connected_components(scenario, cycle)) > 1:
         return _in_parts(scenario, arc, general, cycle, resolution)
     analysis = analyse(scenario, tree, window, resolution)
     bounds = Bounds(analysis)
@@ -124,7 +124,7 @@ def _in_parts(
     notes = [f"Hypothesis '{broken.name}' fails: {broken.detail} {left}"]
     gaps: dict[str, list[float | None]] = {"valid": [], "improved": []}
     touched = {agent for edge in _positive_edges(scenario, cycle) for agent in edge}
-    for part, alone in part_scenarios(scenario, cycle):
+    for part, alone in component_scenarios(scenario, cycle):
         if alone is None and part[0] in touched:
             notes.append(f"Agent {part[0]} by itself: its edges count as absent, and nothing is certified about it.")
             for found in gaps.values():

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 import hybrid_model as hm
 from hybrid_model.consensus.certificates.gaps import frozen_gap, printed_gap
-from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound, rate_of_contraction
+from hybrid_model.consensus.certificates.rates import rate_of_contraction
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
 from hybrid_model.consensus.exact.floquet import floquet_spectrum
-from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import incidence, weighted_laplacian
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
@@ -161,7 +162,7 @@ def minimum_gap() -> Counterexample:
     trigger = Trigger(TriggerKind.STATIC, 0.5)
     scenario = _constant_network(((1, 2),), (0.0, 0.05), 1.0, trigger, 15.0)
     bound = convergence_bound(scenario, BoundForm.PRINTED, window=0.05)
-    speed = bound.edge_factor * float(np.linalg.norm(incidence(2, ((1, 2),)), 2))
+    speed = bound.rho * float(np.linalg.norm(incidence(2, ((1, 2),)), 2))
     gap = run_report(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time)).min_gap
     return Counterexample(
         "Eq. zeno dynamic upper bound: the minimum gap with kappa_1 + kappa_2",
@@ -176,7 +177,7 @@ def corrected_gap_without_kappa1() -> float:
     """The gap of `minimum_gap` with kappa_2 alone: the limit of the paper's own inequality, which holds [s]."""
     scenario = _constant_network(((1, 2),), (0.0, 0.05), 1.0, Trigger(TriggerKind.STATIC, 0.5), 15.0)
     bound = convergence_bound(scenario, BoundForm.PRINTED, window=0.05)
-    speed = bound.edge_factor * float(np.linalg.norm(incidence(2, ((1, 2),)), 2))
+    speed = bound.rho * float(np.linalg.norm(incidence(2, ((1, 2),)), 2))
     return frozen_gap(0.5, 0.0, speed * (bound.kappa2 or 0.0))
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound
-from hybrid_model.consensus.exact.edge_gains import edge_domain_gains
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
+from hybrid_model.consensus.exact.edge_domain import edge_domain_gains
 from hybrid_model.consensus.exact.periodic_edge_domain import periodic_gains
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.messages import ScenarioError

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid_model.consensus.certificates.analysis import Analysis
-from hybrid_model.consensus.excitation.constants import Signal, scenario_excitation, signal_factor
+from hybrid_model.consensus.excitation.persistence import Signal, scenario_excitation, signal_factor
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 
-__all__ = ["energy_radius", "improved_contraction", "initial_peaks"]
+__all__ = ["energy_radius", "initial_peaks"]
 
 _DOUBLINGS = 10
 _LARGEST = 600.0
@@ -20,17 +20,6 @@ _LARGEST = 600.0
 
 _FORGOTTEN = 1e-9
 _MOST_CYCLES = 5000
-
-
-def improved_contraction(analysis: Analysis) -> float:
-    """``gamma* = 2 mu1/(1 + mu2 + ||P||_F^2/2)`` of ``k N``: the share of ``||xi||^2`` lost every window.
-
-    Source: audit, section 3 (ii). 0.0 if the excitation is not persistent.
-    """
-    constants, gain = analysis.disagreement, analysis.scenario.network.gain
-    if constants.mu1 <= 1e-12 * constants.mu2:
-        return 0.0
-    return 2 * gain * constants.mu1 / (1 + gain * constants.mu2 + (gain * constants.frobenius) ** 2 / 2)
 
 
 def energy_radius(analysis: Analysis, decay: float) -> float | None:
@@ -77,7 +66,7 @@ def energy_radius(analysis: Analysis, decay: float) -> float | None:
 def _cycle_constants(analysis: Analysis) -> tuple[float, float, Callable[[int], float]]:
     """T, ``sup int ||N||`` over T, and the square root of q over multiples of T."""
     if not analysis.is_periodic:
-        window, root = analysis.window, math.sqrt(1 - improved_contraction(analysis))
+        window, root = analysis.window, math.sqrt(1 - analysis.improved_contraction)
         return window, analysis.disagreement.mu2_bar, lambda count: root**count
     if analysis.is_constant and analysis.spectrum is not None:
         window, rate = analysis.window, analysis.spectrum.rate

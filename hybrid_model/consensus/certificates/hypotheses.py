@@ -8,8 +8,9 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_model.consensus.certificates.analysis import Analysis, active_edges, connected_parts
+from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.components import active_edges, connected_components
 from hybrid_model.consensus.certificates.envelopes import envelope
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.scenario.definition import Scenario
@@ -57,7 +58,7 @@ def network_hypotheses(scenario: Scenario, cycle: float) -> list[Hypothesis]:
     cycle : float
         Length [s] of the interval from t = 0 over which the union of the graphs is taken.
     """
-    parts = connected_parts(scenario, cycle)
+    parts = connected_components(scenario, cycle)
     period, kind = scenario.edge_weights.period, scenario.trigger.kind
     is_bounded = envelope(scenario) is not None or (kind is TriggerKind.SAMPLED and scenario.channel.ideal)
     joined = "joins all agents" if len(parts) == 1 else f"falls into the parts {_listing(parts)} of the agents"

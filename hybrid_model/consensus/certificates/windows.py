@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from hybrid_model.consensus.certificates.rates import rate_of_contraction, tree_contraction, tree_free_rate
-from hybrid_model.consensus.excitation.constants import Signal, excitation_horizon, signal_factor, window_extremes
+from hybrid_model.consensus.excitation.persistence import Signal, excitation_horizon, signal_factor, window_extremes
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.scenario.definition import Scenario
 

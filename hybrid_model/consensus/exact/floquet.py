@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from hybrid_model.consensus.exact.transition_grid import affordable_resolution, flow_cells
-from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.exact.transition_grid import affordable_resolution, transition_grid
+from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.edge_weights import Piece
 
@@ -91,7 +91,7 @@ def _scaled_spectrum(scenario: Scenario, period: float) -> FloquetSpectrum:
     feeds the kept one. If that alone outlives the period, the rate comes out too small, never too large.
     """
     resolution = affordable_resolution(scenario, 0.0, period, _CELL, _MOST_CELLS)
-    flows = _mild_flows(flow_cells(scenario, 0.0, period, resolution).flows, max(1, int(_MILD / resolution)))
+    flows = _mild_flows(transition_grid(scenario, 0.0, period, resolution).flows, max(1, int(_MILD / resolution)))
     basis, known = np.eye(flows.shape[1]), math.inf
     for _ in range(_SWEEPS):
         start, triangle, logarithm = basis, np.eye(len(basis)), 0.0

@@ -12,15 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid_model.consensus.exact.edge_domain import edge_states_system
 from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum, transition_matrix
-from hybrid_model.consensus.exact.transition_grid import flow_cells
+from hybrid_model.consensus.exact.transition_grid import transition_grid
 from hybrid_model.consensus.exact.worst_case import worst_case
-from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import Edge, disagreement_basis, incidence
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario
-from hybrid_model.linear import StateSpace, named_system
+from hybrid_model.linear import StateSpace
 
 __all__ = ["PeriodicGains", "period_map", "periodic_gains", "periodic_l2_gain"]
 
@@ -81,18 +82,8 @@ def period_map(scenario: Scenario, partition: TreePartition | None = None, start
     tree = partition or TreePartition(network.agents, network.underlying_edges)
     to_tree = tree.incidence_tree.T @ disagreement_basis(network.agents)
     monodromy = to_tree @ transition_matrix(scenario, start, start + period) @ np.linalg.inv(to_tree)
-    edges = len(network.underlying_edges)
-    return named_system(
-        monodromy,
-        (monodromy - np.eye(len(monodromy))) @ tree.incidence_tree.T,
-        tree.R_by_edge.T,
-        np.zeros((edges, network.agents)),
-        inputs=[f"e[{i}]" for i in range(1, network.agents + 1)],
-        states=[f"x_tau[{i}]" for i in range(1, network.agents)],
-        outputs=[f"x_e[{k}]" for k in range(1, edges + 1)],
-        name=scenario.name,
-        period=period,
-    )
+    from_error = (monodromy - np.eye(len(monodromy))) @ tree.incidence_tree.T
+    return edge_states_system(scenario, tree, monodromy, from_error, period)
 
 
 def periodic_gains(scenario: Scenario, resolution: float = 0.01) -> PeriodicGains:
@@ -146,7 +137,7 @@ def periodic_l2_gain(scenario: Scenario, resolution: float = 0.01, tolerance: fl
     """
     _require_consensus(scenario, floquet_spectrum(scenario))
     network = scenario.network
-    cells = flow_cells(scenario, 0.0, _period(scenario), resolution)
+    cells = transition_grid(scenario, 0.0, _period(scenario), resolution)
     factor = signal_factor(scenario, Signal.DISAGREEMENT)
     moved = network.gain * (factor * cells.doses[:, None, :]) @ factor.T
     edge_form = disagreement_basis(network.agents).T @ incidence(network.agents, network.underlying_edges)

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.carriers import Carrier
 from hybrid_model.consensus.weights.edge_weights import Piece
 
-__all__ = ["FlowCells", "affordable_resolution", "dose_between", "flow_cells"]
+__all__ = ["TransitionGrid", "affordable_resolution", "dose_between", "transition_grid"]
 
 _MOST_PER_PIECE = 100_000
 _MOST_BLOCKS = 256
@@ -21,7 +21,7 @@ _TOGETHER = 4
 
 
 @dataclass(frozen=True, eq=False)
-class FlowCells:
+class TransitionGrid:
     """An interval cut into cells, with the transition matrix over each.
 
     Attributes
@@ -97,9 +97,9 @@ class FlowCells:
         return float(np.exp(min(largest + within, 700.0)))
 
 
-def flow_cells(
+def transition_grid(
     scenario: Scenario, t0: float, t1: float, resolution: float, longest: float = np.inf, *, joined: bool = False
-) -> FlowCells:
+) -> TransitionGrid:
     """Cut an interval so finely that the flow hardly changes over a cell.
 
     Parameters
@@ -136,7 +136,7 @@ def flow_cells(
         flows.append(flow)
         doses.append(dose)
         cuts.append(times[1:])
-    return FlowCells(np.concatenate(cuts), np.concatenate(flows), np.concatenate(doses))
+    return TransitionGrid(np.concatenate(cuts), np.concatenate(flows), np.concatenate(doses))
 
 
 def affordable_resolution(scenario: Scenario, t0: float, t1: float, resolution: float, most: int) -> float:

@@ -15,7 +15,7 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_model.consensus.excitation.constants import (
+from hybrid_model.consensus.excitation.persistence import (
     Signal,
     WindowExtremes,
     excitation_horizon,

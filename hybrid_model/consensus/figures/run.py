@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hybrid_model.consensus.certificates.rates import BoundForm, ConvergenceBound
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound
 from hybrid_model.consensus.laws.closed_loop import agent_name
 from hybrid_model.consensus.runs.report import edge_norm
 from hybrid_model.consensus.scenario.definition import Scenario

@@ -8,14 +8,9 @@ import pytest
 from oracles.exact_consensus import exact_run
 from scipy.integrate import quad
 
-from hybrid_model.consensus.certificates.rates import (
-    BoundForm,
-    convergence_bound,
-    default_window,
-    rate_of_contraction,
-    tree_free_rate,
-)
-from hybrid_model.consensus.excitation.constants import Signal, scenario_excitation
+from hybrid_model.consensus.certificates.rates import rate_of_contraction, tree_free_rate
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound, default_window
+from hybrid_model.consensus.excitation.persistence import Signal, scenario_excitation
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import incidence
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
@@ -56,7 +51,7 @@ class TestPublishedReferenceValuesOfScenarioA:
     def test_rho_error_bound_and_initial_norm(self):
         scenario = load_scenario("paper-a")
         bound = convergence_bound(scenario, BoundForm.VALID)
-        assert bound.edge_factor == pytest.approx(2.613126, abs=1e-6)
+        assert bound.rho == pytest.approx(2.613126, abs=1e-6)
         assert bound.error_bound == pytest.approx(math.sqrt(3), rel=1e-15)
         # The published 2.703701 is the norm over all six edges of the complete graph, 2 ||x - mean||.
         assert edge_norm(scenario, np.array(scenario.network.initial)) == pytest.approx(2.703701, abs=1e-6)
@@ -84,7 +79,7 @@ class TestPublishedReferenceValuesOfScenarioA:
         bound = convergence_bound(load_scenario("paper-a-static"), BoundForm.PRINTED)
         growth = bound.rate * bound.window
         expected = bound.disturbance * math.exp(2 * growth) / math.expm1(growth)
-        assert bound.radius == pytest.approx(bound.edge_factor * expected, rel=1e-12)
+        assert bound.radius == pytest.approx(bound.rho * expected, rel=1e-12)
 
 
 def test_two_agents_have_the_constants_found_by_hand():
@@ -113,12 +108,10 @@ class TestThreeCasesOfTheValidForm:
         for t in (0.0, 0.1, 1.0, 5.0):
             integral = quad(lambda s: math.exp((rate - share * rate) * s), 0.0, t, epsabs=1e-12)[0]
             state = bound.transient * math.exp(-rate * t) + per_second * math.exp(-rate * t) * integral
-            exact = bound.edge_factor * state
+            exact = bound.rho * state
             assert exact <= float(bound.at(t)) * (1 + 1e-9)
             # One window more than the integral needs, and within a window the largest exponential for all.
-            assert float(bound.at(t)) <= exact + bound.edge_factor * bound.disturbance * math.exp(3 * rate * 0.2) * (
-                1 + t
-            )
+            assert float(bound.at(t)) <= exact + bound.rho * bound.disturbance * math.exp(3 * rate * 0.2) * (1 + t)
 
     @pytest.mark.parametrize("share", [0.0, 0.5, 2.0])
     def test_kappas_reproduce_the_bound(self, share):
@@ -127,14 +120,14 @@ class TestThreeCasesOfTheValidForm:
         t = np.linspace(0.0, 10.0, 11)
         state = bound.kappa1 * np.exp(-bound.rate * t) + bound.kappa2 * np.exp(-bound.decay * t)
         # kappa1 and kappa2 are about a hundred times their sum at t = 0.
-        np.testing.assert_allclose(bound.at(t), bound.edge_factor * state, rtol=1e-11)
+        np.testing.assert_allclose(bound.at(t), bound.rho * state, rtol=1e-11)
 
     def test_kappas_with_equal_rates(self):
         rate = convergence_bound(self.SCENARIO, BoundForm.VALID).rate
         bound = convergence_bound(with_decay(self.SCENARIO, rate), BoundForm.VALID)
         t = np.linspace(0.0, 10.0, 11)
         state = (bound.kappa1 + bound.kappa2 * (t / bound.window + 1)) * np.exp(-rate * t)
-        np.testing.assert_allclose(bound.at(t), bound.edge_factor * state, rtol=1e-13)
+        np.testing.assert_allclose(bound.at(t), bound.rho * state, rtol=1e-13)
 
     def test_it_is_continuous_in_beta(self):
         rate = convergence_bound(self.SCENARIO, BoundForm.VALID).rate

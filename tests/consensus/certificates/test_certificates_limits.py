@@ -12,11 +12,11 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.certify import certify
-from hybrid_model.consensus.certificates.corollary import corollary_rate, corollary_rate_exact
 from hybrid_model.consensus.certificates.energy import energy_radius
+from hybrid_model.consensus.certificates.rates import corollary_rate, corollary_rate_exact
 from hybrid_model.consensus.exact.floquet import floquet_spectrum
-from hybrid_model.consensus.excitation.constants import Signal, signal_factor, window_extremes
 from hybrid_model.consensus.excitation.joint import joint_excitation
+from hybrid_model.consensus.excitation.persistence import Signal, signal_factor, window_extremes
 from hybrid_model.consensus.graphs.undirected import complete_edges, disagreement_basis, incidence
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario

@@ -16,8 +16,7 @@ from oracles.smooth_runs import smooth_run
 
 from hybrid_model.consensus.certificates.analysis import Analysis, analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
-from hybrid_model.consensus.certificates.energy import improved_contraction
-from hybrid_model.consensus.exact.transition_grid import flow_cells
+from hybrid_model.consensus.exact.transition_grid import transition_grid
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
@@ -79,7 +78,7 @@ def check_rates(random, analysis: Analysis):
         rates.append(bounds.floquet_rate * (1 + ROUNDING))
         factors.append(bounds.floquet_overshoot)
     assert rates == sorted(rates)
-    assert improved_contraction(analysis) < 1
+    assert analysis.improved_contraction < 1
     count = len(cells.flows)
     start = int(random.integers(count)) if analysis.is_periodic else 0
     flow, age = np.eye(cells.flows.shape[1]), 0.0
@@ -151,7 +150,7 @@ def free_states(random, analysis: Analysis, scenario):
         cycle, rest = divmod(t, length)
         place = int(np.searchsorted(cells.times, rest, side="right")) - 1
         begin = float(cells.times[place])
-        last = flow_cells(scenario, begin, rest, 0.1).product() if rest > begin else path[0]
+        last = transition_grid(scenario, begin, rest, 0.1).product() if rest > begin else path[0]
         states.append(U @ last @ path[place] @ np.linalg.matrix_power(path[-1], int(cycle)) @ xi)
     return times, np.array(states)
 

@@ -14,13 +14,12 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.certify import certify
-from hybrid_model.consensus.certificates.corollary import corollary_rate, corollary_rate_exact
-from hybrid_model.consensus.certificates.rates import BoundForm
-from hybrid_model.consensus.certificates.trees import tree_radii
+from hybrid_model.consensus.certificates.rates import corollary_rate, corollary_rate_exact
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, tree_radii
 from hybrid_model.consensus.certificates.verdicts import Verdict, statement
 from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
 from hybrid_model.consensus.exact.reachable_sets import ReachableSets
-from hybrid_model.consensus.exact.transition_grid import flow_cells
+from hybrid_model.consensus.exact.transition_grid import transition_grid
 from hybrid_model.consensus.exact.worst_case import worst_case
 from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, weighted_laplacian
@@ -217,7 +216,7 @@ class TestExactWorstCase:
         )
         radius = worst_case(scenario, 1.0, 0.0).radius / 0.3
         U = disagreement_basis(4)
-        cells = flow_cells(scenario, 0.0, 1.0, 0.1)
+        cells = transition_grid(scenario, 0.0, 1.0, 0.1)
         random = np.random.default_rng(2)
         D = np.stack([np.eye(4)[j - 1] - np.eye(4)[i - 1] for i, j in scenario.network.edges], axis=1)
         for _ in range(20):
@@ -235,7 +234,7 @@ class TestFlowCells:
         for name in ("paper-a",):
             scenario = load_scenario(name)
             np.testing.assert_allclose(
-                flow_cells(scenario, 0.0, 7.0, 0.05).product(), transition_matrix(scenario, 0.0, 7.0), atol=1e-13
+                transition_grid(scenario, 0.0, 7.0, 0.05).product(), transition_matrix(scenario, 0.0, 7.0), atol=1e-13
             )
 
     def test_different_carriers_by_magnus_steps(self):
@@ -248,20 +247,20 @@ class TestFlowCells:
         scenario = network([[1, 2], [2, 3], [3, 4]], weights)
         # transition_matrix integrates such pieces to a relative tolerance of 1e-12.
         np.testing.assert_allclose(
-            flow_cells(scenario, 0.0, 3.0, 0.02).product(), transition_matrix(scenario, 0.0, 3.0), atol=1e-9
+            transition_grid(scenario, 0.0, 3.0, 0.02).product(), transition_matrix(scenario, 0.0, 3.0), atol=1e-9
         )
 
 
 class TestTreesAndCorollary:
     def test_the_number_of_exciting_trees(self):
         # The cycle on four agents has four spanning trees.
-        assert len(tree_radii(analyse(load_scenario("paper-a")))) == 4
+        assert len(tree_radii(load_scenario("paper-a"), 2 * math.pi)) == 4
 
     def test_every_tree_bounds_the_exact_radius(self):
         analysis = analyse(load_scenario("paper-a-static"))
         exact = Bounds(analysis).exact_radius
         for form in BoundForm:
-            for found in tree_radii(analysis, form):
+            for found in tree_radii(analysis.scenario, analysis.window, form):
                 assert found.radius >= exact
 
     @pytest.mark.parametrize("dwell", [math.pi / 2, math.pi, 2 * math.pi])

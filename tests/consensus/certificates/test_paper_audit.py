@@ -11,8 +11,8 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates import counterexamples
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
-from hybrid_model.consensus.certificates.corollary import corollary_rate
-from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound
+from hybrid_model.consensus.certificates.rates import corollary_rate
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
 from hybrid_model.consensus.certificates.verdicts import STATEMENTS, Verdict
 from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
@@ -94,7 +94,7 @@ def numbers(example, cases):
         "minimum gap improved, example, beta = 0.06": dynamic.improved_gap,
         "gap observed, example, beta = 0": static_run.min_gap,
         "gap observed, example, beta = 0.06": dynamic_run.min_gap,
-        "rho, example": printed.edge_factor,
+        "rho, example": printed.rho,
         "C, example": printed.error_bound,
         "share of disagreement left, vanishing weights": cases["g"][0].actual,
         "alpha_v printed with the corollary's window 3 pi, example": literal_window.rate,

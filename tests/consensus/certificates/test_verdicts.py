@@ -25,9 +25,9 @@ from hybrid_model.consensus.certificates.counterexamples import (
     valid_sum,
     vanishing_weights,
 )
-from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
 from hybrid_model.consensus.exact.floquet import transition_matrix
-from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import complete_edges, disagreement_basis, incidence, weighted_laplacian
 from hybrid_model.consensus.laws.closed_loop import closed_loop

@@ -9,7 +9,8 @@ from catalogue_weights import SWITCHING, WEIGHTS, moving_agents, ring
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound, tree_free_rate
+from hybrid_model.consensus.certificates.rates import tree_free_rate
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
 from hybrid_model.consensus.certificates.windows import (
     RateForm,
     best_window,
@@ -18,14 +19,14 @@ from hybrid_model.consensus.certificates.windows import (
     shortest_exciting_window,
 )
 from hybrid_model.consensus.exact.floquet import floquet_spectrum
-from hybrid_model.consensus.excitation.constants import (
+from hybrid_model.consensus.excitation.joint import joint_excitation, tree_excitations
+from hybrid_model.consensus.excitation.persistence import (
     Signal,
     excitation_constants,
     scenario_excitation,
     signal_factor,
     window_extremes,
 )
-from hybrid_model.consensus.excitation.joint import joint_excitation, tree_excitations
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.scenario.files import load_scenario, preset_names
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights

@@ -9,9 +9,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 from hybrid_model.consensus.certificates.edge_comparison import compare_edge_domain
-from hybrid_model.consensus.certificates.rates import BoundForm
-from hybrid_model.consensus.exact.edge_domain import edge_domain_system
-from hybrid_model.consensus.exact.edge_gains import edge_domain_gains, impulse_modes
+from hybrid_model.consensus.certificates.tree_bound import BoundForm
+from hybrid_model.consensus.exact.edge_domain import edge_domain_gains, edge_domain_system, impulse_modes
 from hybrid_model.consensus.exact.exponential_sums import absolute_integral, zeros
 from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
 from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain

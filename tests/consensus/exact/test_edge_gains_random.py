@@ -14,8 +14,8 @@ from scipy.optimize import minimize_scalar
 
 import hybrid_model as hm
 from hybrid_model.consensus.certificates.edge_comparison import compare_edge_domain
-from hybrid_model.consensus.certificates.rates import BoundForm
-from hybrid_model.consensus.exact.edge_gains import edge_domain_gains
+from hybrid_model.consensus.certificates.tree_bound import BoundForm
+from hybrid_model.consensus.exact.edge_domain import edge_domain_gains
 from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.metrics import run_states

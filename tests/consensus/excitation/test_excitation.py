@@ -8,8 +8,13 @@ import pytest
 from scipy.integrate import quad, solve_ivp
 
 from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
-from hybrid_model.consensus.excitation.constants import Signal, excitation_constants, scenario_excitation, signal_factor
 from hybrid_model.consensus.excitation.norm_integral import NormPrimitive
+from hybrid_model.consensus.excitation.persistence import (
+    Signal,
+    excitation_constants,
+    scenario_excitation,
+    signal_factor,
+)
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario

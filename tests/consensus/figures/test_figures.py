@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from hybrid_model.consensus.certificates.rates import BoundForm, convergence_bound
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
 from hybrid_model.consensus.figures.run import (
     COLUMN,
     plot_broadcasts,

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 import hybrid_model as hm
 from hybrid_model.consensus.certificates.windows import RateForm, best_window, rate_over_window
 from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
-from hybrid_model.consensus.excitation.constants import Signal, signal_factor
+from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.graphs.undirected import complete_edges
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import edge_norm, run_report

@@ -9,10 +9,10 @@ import numpy as np
 
 from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.certificates.bounds import Bounds, with_threshold
-from hybrid_model.consensus.certificates.corollary import corollary_rate, corollary_rate_exact
 from hybrid_model.consensus.certificates.hypotheses import PAPER_LAWS, Hypothesis
-from hybrid_model.consensus.certificates.observed import Observation
-from hybrid_model.consensus.certificates.trees import tree_radii
+from hybrid_model.consensus.certificates.observation import Observation
+from hybrid_model.consensus.certificates.rates import corollary_rate, corollary_rate_exact
+from hybrid_model.consensus.certificates.tree_bound import tree_radii
 from hybrid_model.consensus.certificates.verdicts import statement
 from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.runs.report import edge_norm
@@ -65,7 +65,7 @@ def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
         bound = bounds.valid
         if bound.kappa1 is None or bound.kappa2 is None:
             return ""
-        factor, kappa1, kappa2 = bound.edge_factor, bound.edge_factor * bound.kappa1, bound.edge_factor * bound.kappa2
+        factor, kappa1, kappa2 = bound.rho, bound.rho * bound.kappa1, bound.rho * bound.kappa2
         if bound.decay == bound.rate:
             shape = f"({factor * bound.transient:.6g} + {kappa2:.6g} (1 + t/{bound.window:.6g}))"
         else:
@@ -160,7 +160,7 @@ def _corollary(analysis: Analysis) -> Iterator[str]:
 
 def _radius_notes(bounds: Bounds) -> Iterator[str]:
     scenario = bounds.analysis.scenario
-    found = tree_radii(bounds.analysis) if bounds.parts and scenario.trigger.threshold > 0 else []
+    found = tree_radii(scenario, bounds.analysis.window) if bounds.parts and scenario.trigger.threshold > 0 else []
     if len(found) > 1:
         least, most = min(found, key=lambda t: t.kappa2), max(found, key=lambda t: t.kappa2)
         best = min(found, key=lambda t: t.radius)

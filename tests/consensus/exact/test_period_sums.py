@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybrid_model.consensus.exact.reachable_sets import _support
+from hybrid_model.consensus.exact.period_sums import support_over_periods
 
 
 def one_by_one(generators, monodromy, direction, tail):
@@ -40,7 +40,7 @@ def drawn(seed, size, slowest, spread, turning):
 )
 def test_values_are_those_of_the_periods_one_by_one(seed, size, slowest, spread, turning, tail):
     generators, monodromy, directions = drawn(seed, size, slowest, spread, turning)
-    values, points = _support(generators, monodromy, directions, tail)
+    values, points = support_over_periods(generators, monodromy, directions, tail)
     # Errors that are admissible reach the value, and nothing beyond it.
     np.testing.assert_allclose(np.einsum("ic,ic->c", directions, points), values, rtol=1e-8)
     for k, direction in enumerate(directions.T):
@@ -53,11 +53,11 @@ def test_values_are_those_of_the_periods_one_by_one(seed, size, slowest, spread,
 def test_a_billion_periods_are_summed_at_once():
     """A geometric series: without memory of the number of periods, 1/(1 - m)."""
     slow = 1 - 1e-7
-    values, points = _support(np.array([[1.0]]), np.array([[slow]]), np.array([[2.0]]), 1e-12)
+    values, points = support_over_periods(np.array([[1.0]]), np.array([[slow]]), np.array([[2.0]]), 1e-12)
     assert values == pytest.approx([2e7], rel=1e-8)
     assert points == pytest.approx(np.array([[1e7]]), rel=1e-8)
 
 
 def test_what_does_not_vanish_is_refused():
     with pytest.raises(ValueError, match="does not vanish"):
-        _support(np.array([[1.0]]), np.array([[1.0]]), np.array([[1.0]]))
+        support_over_periods(np.array([[1.0]]), np.array([[1.0]]), np.array([[1.0]]))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.hypotheses import PAPER_LAWS
-from hybrid_model.consensus.certificates.observed import Observation
+from hybrid_model.consensus.certificates.observation import Observation
 from hybrid_model.consensus.certificates.verdicts import statement
 
 __all__ = ["FORMS", "Certified", "certified_values"]
