@@ -58,7 +58,7 @@ def compare_edge_domain(
     scenario : Scenario
         With periodic or constant weights that join all agents, and a trigger that has a threshold.
     partition, window
-        As in `hybrid_model.consensus.certificates.rates.convergence_bound`.
+        As in `hybrid_model.consensus.certificates.tree_bound.convergence_bound`.
     resolution : float
         As in `edge_domain_gains` and `periodic_gains`.
 
