@@ -23,7 +23,6 @@ from hybrid_model.declare.transitions import (
     Trigger,
 )
 from hybrid_model.declare.variables import Declaration, Dimension, Kind, Value, Values, Variable
-from hybrid_model.declare.vector_form import VectorForm
 from hybrid_model.errors import DeclarationError
 
 NO_SYMBOLS = (str, bytes, numbers.Complex, tuple, list, dict, set, type(None), FunctionType, np.ndarray, np.generic)
@@ -95,10 +94,6 @@ class Automaton(ABC):
     def of_kind(self, *kinds: Kind) -> list[Variable]:
         """Return the variables of the given kinds, in declaration order."""
         return [v for v in self.variables if v.kind in kinds]
-
-    def vector_form(self) -> VectorForm:
-        """Return the maps on vectors, which executions evaluate; they give the same numbers as the maps above."""
-        return VectorForm(self)
 
 
 class HybridAutomaton(Automaton):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
@@ -13,8 +13,12 @@ from hybrid_model.declare.transitions import Assignments
 from hybrid_model.declare.variables import FloatArray, Kind, Value, Values, Variable, element_names
 from hybrid_model.errors import DeclarationError
 
-if TYPE_CHECKING:
-    from hybrid_model.declare.automaton import Automaton
+
+class Declares(Protocol):
+    """What has variables, as every automaton does."""
+
+    name: str
+    variables: tuple[Variable, ...]
 
 
 @dataclass(frozen=True)
@@ -39,18 +43,24 @@ class Layout:
     ----------
     automaton : Automaton
         Whose variables are laid out, kind by kind in declaration order, arrays row by row.
+
+    Attributes
+    ----------
+    owner : str
+        The automaton's name, for messages.
     """
 
-    def __init__(self, automaton: Automaton) -> None:
-        self.automaton = automaton
+    def __init__(self, automaton: Declares) -> None:
+        self.owner = automaton.name
         self.places: dict[Kind, tuple[Place, ...]] = {}
         self.sizes: dict[Kind, int] = {}
         for kind in Kind:
             at = 0
             places = []
-            for variable in automaton.of_kind(kind):
-                places.append(Place(variable, slice(at, at + variable.size)))
-                at += variable.size
+            for variable in automaton.variables:
+                if variable.kind is kind:
+                    places.append(Place(variable, slice(at, at + variable.size)))
+                    at += variable.size
             self.places[kind] = tuple(places)
             self.sizes[kind] = at
         # Values are read in the inner loop of every run, so what does not change is looked up once.
@@ -87,7 +97,7 @@ class Layout:
                 vector.flags.writeable = False
             for name, at, shape in entries:
                 values[name] = vector[at].reshape(shape) if shape else vector[at]
-        return Values(self.automaton.name, values)
+        return Values(self.owner, values)
 
     def pack(self, kind: Kind, assignments: Assignments, otherwise: FloatArray | None = None) -> FloatArray:
         """Write values by name into a vector of floats.
@@ -121,11 +131,11 @@ class Layout:
             given = real_array(value)
         except (TypeError, ValueError, OverflowError) as error:
             raise DeclarationError(
-                f"{self.automaton.name}: the value computed for {variable.name} is {told(value)}: {_remedy(variable)}."
+                f"{self.owner}: the value computed for {variable.name} is {told(value)}: {_remedy(variable)}."
             ) from error
         if given.shape not in ((), variable.shape):
             raise DeclarationError(
-                f"{self.automaton.name}: the value computed for {variable.name} has shape {given.shape}, but "
+                f"{self.owner}: the value computed for {variable.name} has shape {given.shape}, but "
                 f"{variable.name} has shape {variable.shape}: {_remedy(variable)}."
             )
         return given.ravel() if given.shape else given

@@ -75,7 +75,7 @@ class Inputs:
             if name in parameters:
                 breakpoints += self._tune(parameters[name], value)
             elif name not in places:
-                raise DeclarationError(unknown_input(layout.automaton.name, name, places))
+                raise DeclarationError(unknown_input(layout.owner, name, places))
             elif isinstance(value, Signal):
                 self._signals.append((places[name], value.value))
                 breakpoints += _finite_breakpoints(name, value)
@@ -83,7 +83,7 @@ class Inputs:
                 require_map(f"input {name}", value, ("t",))
                 if places[name].variable.discrete:
                     raise DeclarationError(
-                        f"{layout.automaton.name}: input {name} changes at jumps only, so it cannot be a plain "
+                        f"{layout.owner}: input {name} changes at jumps only, so it cannot be a plain "
                         "function of time: give a number, or a Signal with the times at which it changes."
                     )
                 self._signals.append((places[name], value))
@@ -93,7 +93,7 @@ class Inputs:
 
     def _tune(self, place: Place, value: InputValue) -> list[float]:
         """Take what is given for a parameter, and return its breakpoints."""
-        owner, name = self._layout.automaton.name, place.variable.name
+        owner, name = self._layout.owner, place.variable.name
         require_tunable(owner, place.variable, value)
         if isinstance(value, Signal):
             times = _finite_breakpoints(name, value)
@@ -129,8 +129,8 @@ class Inputs:
         """Set an input to a constant; return whether that changed it."""
         place = next((q for q in self._layout.places[Kind.INPUT] if q.variable.name == name), None)
         if place is None:
-            raise DeclarationError(unknown_input(self._layout.automaton.name, name, dict.fromkeys(self.names)))
-        given = start_array(f"{self._layout.automaton.name}.{name}", value)
+            raise DeclarationError(unknown_input(self._layout.owner, name, dict.fromkeys(self.names)))
+        given = start_array(f"{self._layout.owner}.{name}", value)
         if given.shape not in ((), place.variable.shape):
             raise DeclarationError(
                 f"input {name} has shape {place.variable.shape}, but the value given has shape {given.shape}: give one "

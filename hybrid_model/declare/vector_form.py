@@ -1,21 +1,19 @@
 """The maps of an automaton on vectors of floats: what executions evaluate.
 
-An automaton's own maps take values by name. Here they take the vectors t, x, z, u, p of its layout; an automaton that
-knows a faster way to evaluate itself offers a vector form of its own (see `Automaton.vector_form`).
+An automaton's own maps take values by name. Here they take the vectors t, x, z, u, p of its layout; a kind of automaton
+that knows a faster way to evaluate itself registers a vector form of its own with `vector_form`.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.variables import FloatArray, Kind
-
-if TYPE_CHECKING:
-    from hybrid_model.declare.automaton import Automaton
 
 
 class VectorForm:
@@ -73,3 +71,9 @@ class VectorForm:
         """Return x and z after jump number `jump`."""
         new = self.automaton.reset(jump, self.layout.values(t, x, z, u, p))
         return self.layout.pack(Kind.STATE, new, x), self.layout.pack(Kind.DISCRETE, new, z)
+
+
+@functools.singledispatch
+def vector_form(automaton: Automaton) -> VectorForm:
+    """Return the maps of an automaton on vectors; they give the same numbers as its maps on values by name."""
+    return VectorForm(automaton)

@@ -52,7 +52,7 @@ class FrozenPoint:
         DeclarationError
             For an unknown name, a wrong shape, or a value that is not finite.
         """
-        owner = self.layout.automaton.name
+        owner = self.layout.owner
         given = start_array(f"{owner}.{name}", value)
         known: dict[str, tuple[Kind, slice, tuple[int, ...]]] = {}
         for kind in kinds:
@@ -97,7 +97,7 @@ def find_places(layout: Layout, names: Sequence[str], kinds: Sequence[Kind]) -> 
     for name in names:
         if name not in known:
             what = " and ".join(kind.value for kind in kinds)
-            raise DeclarationError(unknown_name(f"{layout.automaton.name} ({what})", name, known))
+            raise DeclarationError(unknown_name(f"{layout.owner} ({what})", name, known))
     return tuple(known[name] for name in names)
 
 

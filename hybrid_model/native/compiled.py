@@ -16,7 +16,7 @@ import numpy as np
 from hybrid_model.declare.automaton import Automaton, require_automaton
 from hybrid_model.declare.transitions import Assignments
 from hybrid_model.declare.variables import FloatArray, Kind, Value, Values
-from hybrid_model.declare.vector_form import VectorForm
+from hybrid_model.declare.vector_form import VectorForm, vector_form
 from hybrid_model.native.trace import Trace, trace
 
 
@@ -47,7 +47,7 @@ class _Compiled(Automaton):
 
     def __init__(self, automaton: Automaton) -> None:
         self._automaton = automaton
-        self._trace = trace(automaton)
+        self.traced = trace(automaton)
         self.name, self.variables = automaton.name, automaton.variables
         self.jumps, self.clocks, self.priority = automaton.jumps, automaton.clocks, automaton.priority
 
@@ -83,10 +83,6 @@ class _Compiled(Automaton):
     def output_values(self, s: Values) -> Assignments:
         """See `Automaton.output_values`."""
         return self._automaton.output_values(s)
-
-    def vector_form(self) -> VectorForm:
-        """Return the traced maps; each call has buffers of its own."""
-        return _TracedForm(self, self._trace)
 
 
 class _TracedForm(VectorForm):
@@ -161,6 +157,12 @@ class _TracedForm(VectorForm):
     def _split(self, states: FloatArray) -> tuple[FloatArray, FloatArray]:
         count = self.layout.sizes[Kind.STATE]
         return states[:count], states[count:]
+
+
+@vector_form.register
+def _(automaton: _Compiled) -> VectorForm:
+    """Each call has buffers of its own."""
+    return _TracedForm(automaton, automaton.traced)
 
 
 class _Buffered:

@@ -16,6 +16,7 @@ from hybrid_model.declare.layout import not_finite
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.transitions import Priority, Trigger
 from hybrid_model.declare.variables import FloatArray, Kind, Values
+from hybrid_model.declare.vector_form import vector_form
 from hybrid_model.errors import SimulationError
 from hybrid_model.record.flow_piece import FlowPiece, straight_piece
 from hybrid_model.record.jump_record import JumpRecord
@@ -80,7 +81,7 @@ class Execution:
         if not math.isfinite(t_start):
             raise SimulationError(f"the start time of {automaton.name} is {t_start}: give a finite number.")
         self.automaton = automaton
-        self.maps = automaton.vector_form()
+        self.maps = vector_form(automaton)
         self.layout = self.maps.layout
         self.inputs = inputs or Inputs(self.layout)
         self.solver = solver or Solver()

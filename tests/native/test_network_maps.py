@@ -14,6 +14,7 @@ from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import Kind
+from hybrid_model.declare.vector_form import vector_form
 from hybrid_model.models import BouncingBall
 from hybrid_model.native.networks.network import network_trace
 from hybrid_model.native.trace import trace
@@ -261,7 +262,7 @@ def points(layout, count=3):
 
 def test_the_maps_are_those_of_python(network):
     composition, traced, compiled = network
-    form, layout = composition.vector_form(), traced.layout
+    form, layout = vector_form(composition), traced.layout
     nx, nz, _, _ = (layout.sizes[kind] for kind in KINDS)
     on_state = sum(info.trigger is Trigger.STATE for info in composition.jumps)
     for t, *vectors in points(layout):

@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_fmus import EXTENSION, binary
 
-from fmu.validate.binaries.binary import BinaryError, read_binary
+from fmu.validate.binaries.binary import read_binary
+from fmu.validate.binaries.shared_library import BinaryError
 from fmu.validate.functions import required
 
 PLACES = Path(fmpy.__path__[0])

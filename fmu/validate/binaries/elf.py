@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fmu.validate.binaries.binary import Binary, BinaryError, Bytes, bounded, first
+from fmu.validate.binaries.shared_library import Binary, BinaryError, Bytes, bounded, first
 
 _MACHINES = {3: "x86", 20: "ppc32", 21: "ppc64", 40: "aarch32", 62: "x86_64", 183: "aarch64", 243: "riscv"}
 _LOAD, _DYNAMIC, _GNU_STACK = 1, 2, 0x6474E551

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fmu.validate.binaries.binary import Binary, BinaryError, Bytes, bounded
+from fmu.validate.binaries.shared_library import Binary, BinaryError, Bytes, bounded
 
 MAGICS = (b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe")
 _FAT = MAGICS[2]

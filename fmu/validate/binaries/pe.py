@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fmu.validate.binaries.binary import Binary, BinaryError, Bytes, bounded
+from fmu.validate.binaries.shared_library import Binary, BinaryError, Bytes, bounded
 
 _MACHINES = {0x14C: "x86", 0x8664: "x86_64", 0x1C4: "aarch32", 0xAA64: "aarch64"}
 _DLL = 0x2000

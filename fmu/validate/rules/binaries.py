@@ -8,7 +8,8 @@ from pathlib import PurePosixPath
 
 from fmu.archives.archive import Archive
 from fmu.validate import functions
-from fmu.validate.binaries.binary import Binary, BinaryError, read_binary
+from fmu.validate.binaries.binary import read_binary
+from fmu.validate.binaries.shared_library import Binary, BinaryError
 from fmu.validate.description import Description
 from fmu.validate.findings import Finding, error, note, quoted, warning
 from fmu.validate.platforms import EXTENSIONS, FMI2, parts_of
