@@ -141,7 +141,9 @@ class LateClock(hm.HybridAutomaton):
 
 @pytest.mark.parametrize(("pause", "f", "r"), [(1000.0, 1e6, 1e-3), (86400.0, 2e3, 0.02), (100.0, 1e5, 0.01)])
 def test_a_pause_does_not_make_regular_jumps_an_accumulation(pause, f, r):
-    arc = hm.simulate(LateClock(pause=pause, f=f, r=r), pause + 300.0 / f)
+    # The gaps of 310 ticks are those of 1 / (f (1 + r n)).
+    ticks = np.log1p(310 * r) / (r * f)
+    arc = hm.simulate(LateClock(pause=pause, f=f, r=r), pause + ticks)
     assert arc.stop is hm.Stop.HORIZON
     assert len(arc.jumps) > 300
 
