@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import CosimError, MisfitError
-from cosim.slave import Port, Slave, Step, Update, Value
+from cosim.slave import Port, Slave
+from fmu.importer.values import Value
 from hybrid_model import Automaton, Execution, Solver, ZenoGuard
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import Kind, element_names
 from hybrid_model.errors import SchedulingError
 from hybrid_model.schedule.automaton_block import AutomatonBlock
+from hybrid_model.schedule.blocks import Step, Update
 
 
 class AutomatonSlave(Slave):

@@ -21,10 +21,10 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model
 from fmpy.fmi3 import FMU3Model
 
-from fmu.archives.archive import Archive
+from fmu.archives.reading import Archive
 from fmu.importer.callbacks import Callbacks
-from fmu.importer.folders import temporary_folder
 from fmu.importer.loading import load_binary, read_description
+from fmu.importer.temporary_folders import temporary_folder
 from fmu.importer.unpacking import unpack
 from fmu.importer.values import access, exact
 

@@ -12,9 +12,10 @@ from cosim.instances.calls import FmuCalls
 from cosim.instances.fmu_file import FmuFile
 from cosim.instances.instance import FmuInstance
 from cosim.instances.variables import STRUCTURAL, FmuVariables
-from cosim.slave import Slave, Step, Update, Value
-from fmu.importer.values import UnfitError, exact, parsed, require_within
+from cosim.slave import Slave
+from fmu.importer.values import UnfitError, Value, exact, parsed, require_within
 from hybrid_model.scales import ROUNDINGS
+from hybrid_model.schedule.blocks import Step, Update
 
 MAX_PARTS = 10_000
 """Most early returns without an event within one step."""

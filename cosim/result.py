@@ -11,8 +11,6 @@ import numpy.typing as npt
 from hybrid_model.schedule.blocks import Termination
 from hybrid_model.schedule.scheduler import Event, Tick
 
-__all__ = ["CosimResult", "Ended", "Event", "Tick"]
-
 
 class Ended(enum.Enum):
     """Why a co-simulation ended; the value is the remedy."""

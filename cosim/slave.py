@@ -8,12 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import MisfitError
-from hybrid_model.schedule.blocks import Block, Step, Termination, Update
-
-__all__ = ["Port", "Slave", "Step", "Termination", "Update", "Value"]
-
-Value = float | str | bytes
-"""What a variable holds: a number, an int or bool exactly as such, a text, or bytes."""
+from fmu.importer.values import Value
+from hybrid_model.schedule.blocks import Block
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,12 @@ import tempfile
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
-from fmu.build.binaries import binaries, fmi_headers, own_files, package, runtime_sources
-from fmu.build.content import archive_content
+from fmu.archives.writing import check_target, package
+from fmu.build.archive_members import archive_members
+from fmu.build.binaries import binaries, fmi_headers, own_files, runtime_sources
 from fmu.build.model_code import model_code
-from fmu.build.package import check_target
-from fmu.describe.description import model_identifier
+from fmu.build.source_files import source_names
+from fmu.describe.description import Description, model_identifier
 from fmu.describe.variables import Fmi, fmu_variables
 from fmu.errors import ExportError
 from hybrid_model import Automaton
@@ -78,7 +79,7 @@ def export_fmu(
     ------
     ExportError
         If a map cannot be traced, a name is taken twice, an option is unknown, or a time is not finite and positive.
-    fmu.build.binaries.BuildError
+    fmu.errors.BuildError
         If there is no C compiler, the code does not compile, or the file cannot be written.
     """
     require_automaton("export_fmu", automaton)
@@ -94,19 +95,10 @@ def export_fmu(
     runtime = runtime_sources(version.value)
 
     code = model_code(traced, variables, _TOKEN, chosen)
-    content = archive_content(
-        traced,
-        variables,
-        _TOKEN,
-        code,
-        fmi=version,
-        kinds=chosen,
-        stop_time=stop_time,
-        step_size=step_size,
-        sources=sources,
-        # A run of a large network in Python takes longer than all else together.
-        references=not isinstance(traced, NetworkTrace),
-    )
+    listed = tuple(source_names(version)) if sources else ()
+    description = Description(traced, variables, _TOKEN, version, chosen, stop_time, step_size, listed)
+    # A run of a large network in Python takes longer than all else together.
+    content = archive_members(description, code, references=not isinstance(traced, NetworkTrace))
     # The token ties description and code together: it changes when either does.
     written = [content["modelDescription.xml"], code.encode(), *map(Path.read_bytes, [*runtime, *_headers()])]
     token = hashlib.sha256(b"".join(written)).hexdigest()[: len(_TOKEN)]

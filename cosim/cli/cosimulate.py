@@ -18,7 +18,7 @@ from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
 from fmu.export import export_fmu
-from fmu.importer.folders import temporary_folder
+from fmu.importer.temporary_folders import temporary_folder
 from fmu.importer.values import shown
 from hybrid_model.consensus.laws.closed_loop import scenario_agents
 from hybrid_model.consensus.scenario.definition import Scenario

@@ -18,8 +18,8 @@ from types import ModuleType
 from typing import Any
 
 from cosim.cli.exits import Exit, UsageError, progress, start_values
-from fmu.archives.device_names import no_device
-from fmu.build.binaries import check_target
+from fmu.archives.checks import no_device
+from fmu.archives.writing import check_target
 from fmu.build.platforms import PLATFORMS
 from fmu.describe.variables import Fmi
 from fmu.errors import ExportError

@@ -11,8 +11,7 @@ from collections.abc import Sequence
 from cosim.cli import certify, cosimulate, export, paper, simulate, validate
 from cosim.cli.exits import Exit, UsageError
 from cosim.errors import CosimError
-from fmu.build.binaries import BuildError
-from fmu.errors import ExportError
+from fmu.errors import BuildError, ExportError
 from hybrid_model import HybridModelError
 from hybrid_model.consensus.messages import ScenarioError
 

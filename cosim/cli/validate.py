@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.exits import Exit, UsageError, progress
-from fmu.validate.child_process import RunLimits
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import Report, Severity
-from fmu.validate.fmu_file import check_fmu
+from fmu.validate.smoke.child_process import RunLimits
 
 _DESCRIPTION = """\
 Check an FMU of FMI 2.0 or 3.0: safety of the archive, schemas, fmpy's checks, semantic rules, exported symbols, and a

@@ -10,7 +10,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import fmi3Fatal, fmi3OK, fmi3Warning
 
 from cosim.errors import CosimError
-from cosim.slave import Termination
+from hybrid_model.schedule.blocks import Termination
 
 MESSAGES = 100
 """Most messages of one call that are kept."""

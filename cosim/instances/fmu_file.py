@@ -15,9 +15,9 @@ from cosim.errors import CosimError
 from cosim.instances.fmi2 import Fmi2Instance
 from cosim.instances.fmi3 import Fmi3Instance
 from cosim.instances.instance import FmuInstance
-from fmu.archives.archive import Archive
-from fmu.importer.folders import temporary_folder
+from fmu.archives.reading import Archive
 from fmu.importer.loading import read_description
+from fmu.importer.temporary_folders import temporary_folder
 from fmu.importer.unpacking import unpack
 
 _alone: dict[str, str] = {}

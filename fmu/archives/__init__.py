@@ -1,4 +1,4 @@
-"""Whether an archive may be unpacked, and which names a file may have: for `cosim`, `validate` and the exporter alike.
+"""The ZIP archive of an FMU: what is checked (`checks`), read and extracted (`reading`), and written (`writing`).
 
-It imports nothing of the project.
+For `cosim`, `validate` and the exporter alike; it imports `fmu.errors` and the standard library.
 """

@@ -6,30 +6,12 @@ import importlib.util
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from fmu.archives.writing import replacing
 from fmu.build.compiler import find_compiler, zig_compiler
-from fmu.build.libraries import COMMON_FLAGS, GENERATED_FLAGS, STRICT_FLAGS, build_libraries
-from fmu.build.package import ARCHIVE_DATE, check_target, package, replacing
-from fmu.build.platforms import PLATFORMS, Platform, chosen_platforms, library_members, this_platform
+from fmu.build.libraries import build_libraries
+from fmu.build.platforms import Platform, chosen_platforms, library_members, this_platform
 from fmu.errors import BuildError
 from hybrid_model.native.engine_files import ENGINE_FOLDERS
-
-__all__ = [
-    "ARCHIVE_DATE",
-    "COMMON_FLAGS",
-    "GENERATED_FLAGS",
-    "OWN_FOLDERS",
-    "PLATFORMS",
-    "STRICT_FLAGS",
-    "BuildError",
-    "binaries",
-    "check_target",
-    "compile_fmu",
-    "find_compiler",
-    "fmi_headers",
-    "own_files",
-    "package",
-    "runtime_sources",
-]
 
 OWN_FOLDERS = (*ENGINE_FOLDERS, Path(__file__).resolve().parents[1] / "interface")
 """Folders of the C sources and headers that every FMU carries: the engine, and the interface of the standard."""

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from fmu.build.binaries import fmi_headers, own_files
-from fmu.describe.parts import to_bytes
 from fmu.describe.variables import Fmi
+from fmu.describe.xml_text import to_bytes
 
 MODEL = "model.c"
 """The generated file."""
@@ -49,7 +49,7 @@ def source_names(fmi: Fmi) -> list[str]:
     return sorted([MODEL, *(file.name for file in runtime_files(fmi) if file.suffix == ".c")])
 
 
-def source_content(model_code: str, identifier: str, fmi: Fmi) -> dict[str, bytes]:
+def source_members(model_code: str, identifier: str, fmi: Fmi) -> dict[str, bytes]:
     """Return the members of an FMU's archive below ``sources/``.
 
     Parameters

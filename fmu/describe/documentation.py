@@ -6,9 +6,9 @@ import inspect
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from fmu.describe.names import xml_text
-from fmu.describe.parts import Description, number, start_text, summary
+from fmu.describe.description import Description, start_text, summary
 from fmu.describe.variables import Bank, Fmi, FmiType, FmuVariable
+from fmu.describe.xml_text import number, xml_text
 from hybrid_model import Composition
 from hybrid_model.declare.transitions import Priority, Trigger
 
@@ -51,15 +51,13 @@ _EVENTS = {
 }
 
 
-def index_page(description: Description, fmi: Fmi, related: Sequence[str] = ()) -> bytes:
+def index_page(description: Description, related: Sequence[str] = ()) -> bytes:
     """Return documentation/index.html.
 
     Parameters
     ----------
     description : Description
         The automaton and its variables.
-    fmi : Fmi
-        Version of the standard.
     related : sequence of str
         Other members of the archive that the page links to.
 
@@ -71,13 +69,13 @@ def index_page(description: Description, fmi: Fmi, related: Sequence[str] = ()) 
     name = _text(description.automaton.name)
     body = [
         f"<h1>{name}</h1>",
-        *_purpose(description, fmi),
+        *_purpose(description),
         "<h2>Variables</h2>",
         *_variables(description),
         *_jumps(description),
         *_clocks(description),
         "<h2>Events</h2>",
-        *(f"<p>{_text(paragraph)}</p>" for paragraph in (*_EVENTS[fmi], *_tuning(description, fmi))),
+        *(f"<p>{_text(paragraph)}</p>" for paragraph in (*_EVENTS[description.fmi], *_tuning(description))),
         *_related(related),
     ]
     head = f'<meta charset="utf-8"/>\n<title>{name}</title>\n<style>{_STYLE}</style>'
@@ -89,7 +87,7 @@ def _text(text: str) -> str:
     return escape(xml_text(text))
 
 
-def _purpose(description: Description, fmi: Fmi) -> list[str]:
+def _purpose(description: Description) -> list[str]:
     kinds = " and ".join(
         name for kind, name in (("cs", "Co-Simulation"), ("me", "Model Exchange")) if kind in description.kinds
     )
@@ -102,7 +100,7 @@ def _purpose(description: Description, fmi: Fmi) -> list[str]:
     experiment = (
         "" if description.stop_time is None else f" The proposed experiment ends at {description.stop_time:g} s."
     )
-    return [*told, f"<p>A hybrid automaton as an FMU for FMI {fmi.value}: {kinds}.{experiment}</p>"]
+    return [*told, f"<p>A hybrid automaton as an FMU for FMI {description.fmi.value}: {kinds}.{experiment}</p>"]
 
 
 def _table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
@@ -140,12 +138,12 @@ def _row(name: str, variable: FmuVariable) -> tuple[str, ...]:
     return name, kind, _TYPES[variable.type] + shape, variable.unit, start, variable.description
 
 
-def _tuning(description: Description, fmi: Fmi) -> list[str]:
+def _tuning(description: Description) -> list[str]:
     """Say when tunable parameters may be set, if there are any."""
     if not any(variable.tunable for variable in description.variables):
         return []
     kinds = {
-        "cs": "between two steps in Co-Simulation" + (", or in its Event Mode" if fmi is Fmi.V3_0 else ""),
+        "cs": "between two steps in Co-Simulation" + (", or in its Event Mode" if description.fmi is Fmi.V3_0 else ""),
         "me": "in Event Mode in Model Exchange",
     }
     places = "; ".join(text for kind, text in kinds.items() if kind in description.kinds)

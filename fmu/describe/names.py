@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
+from fmu.describe.xml_text import in_xml
 from fmu.errors import ExportError
 
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -26,7 +27,6 @@ _ESCAPES = {c: f"\\{c}" for c in "'\"\\"} | {
     "\t": "\\t",
     "\v": "\\v",
 }
-_NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def variable_names(owner: str, names: Sequence[str]) -> tuple[list[str], str]:
@@ -106,7 +106,7 @@ def _part(part: str) -> str | None:
 def _flat(owner: str, name: str) -> str:
     if not name:
         raise ExportError(f"{owner} has a variable without a name: every variable of an FMU needs one.")
-    bad = next((c for c in name if c in "\t\n\r" or _NOT_XML.match(c)), None)
+    bad = next((c for c in name if c in "\t\n\r" or not in_xml(c)), None)
     if bad is not None:
         raise ExportError(
             f"{owner} has a variable called {shortened(name)}: a name in a model description cannot hold the "
@@ -118,8 +118,3 @@ def _flat(owner: str, name: str) -> str:
 def shortened(name: str) -> str:
     """Return a name in quotes for a message, at most some 60 characters of it."""
     return repr(name) if len(name) <= 60 else f"{name[:50]!r}... ({len(name)} characters)"
-
-
-def xml_text(text: str) -> str:
-    """Return text for an XML attribute: what XML 1.0 cannot hold becomes U+FFFD, the replacement character."""
-    return _NOT_XML.sub("\ufffd", text)

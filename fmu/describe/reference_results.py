@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 import hybrid_model as hm
+from fmu.describe.description import TOLERANCE, Description
 from fmu.describe.experiment import round_step
-from fmu.describe.names import xml_text
-from fmu.describe.parts import TOLERANCE, Description, number, to_bytes
 from fmu.describe.variables import Bank, FmuVariable
+from fmu.describe.xml_text import number, to_bytes, xml_text
 from hybrid_model.declare.variables import FloatArray, Kind, element_names
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"

@@ -16,10 +16,10 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
-from fmu.describe.jumps import output_jumps
-from fmu.describe.names import xml_text
-from fmu.describe.parts import Description, to_bytes
+from fmu.describe.changed_by_jumps import output_jumps
+from fmu.describe.description import Description
 from fmu.describe.variables import Bank
+from fmu.describe.xml_text import to_bytes, xml_text
 from hybrid_model.declare.layout import Place
 from hybrid_model.declare.variables import Kind, element_names
 

@@ -27,6 +27,11 @@ class Fmi(enum.Enum):
     V2_0 = "2.0"
     V3_0 = "3.0"
 
+    @property
+    def major(self) -> int:
+        """First part of the version."""
+        return int(self.value[0])
+
 
 class Bank(enum.Enum):
     """What a variable shows; the value is the name in hybrid_model/engine/model.h."""

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
-from fmu.archives.archive import Archive
+from fmu.archives.reading import Archive
 
 Fmu = TypeVar("Fmu")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from fmu.archives.archive import Archive
+from fmu.archives.reading import Archive
 
 _RESOURCES = "resources"
 

@@ -1,4 +1,5 @@
 """Checks of anybody's FMU: archive, XML, semantic rules, symbols, and a run in a child process.
 
-The entry is `fmu.validate.fmu_file.check_fmu`; `fmu.archives.archive` also serves importers that extract an FMU.
+The entry is `fmu.validate.check.check_fmu`. It imports `fmu.archives`, `fmu.importer` and `fmu.standard`, never the
+exporter: what checks an FMU shares no code with what makes one.
 """

@@ -22,7 +22,9 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
-from fmu.build.binaries import COMMON_FLAGS, STRICT_FLAGS, find_compiler, fmi_headers
+from fmu.build.binaries import fmi_headers
+from fmu.build.compiler import find_compiler
+from fmu.build.libraries import COMMON_FLAGS, STRICT_FLAGS
 from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall
 

@@ -15,9 +15,11 @@ from description_cases import BOTH, findings, schema
 from lxml import etree
 
 import hybrid_model as hm
-from fmu.build.binaries import package
-from fmu.build.content import archive_content
+from fmu.archives.writing import package
+from fmu.build.archive_members import archive_members
 from fmu.build.model_code import model_code
+from fmu.build.source_files import source_names
+from fmu.describe.description import Description
 from fmu.describe.experiment import round_step
 from fmu.describe.reference_results import FOLDER
 from fmu.describe.variables import Fmi, fmu_variables
@@ -28,11 +30,12 @@ TOKEN = "0123456789abcdef0123456789abcdef"
 KINDS = ("cs", "me")
 
 
-def content(automaton, fmi, **options):
+def content(automaton, fmi, *, sources=True, references=True, kinds=KINDS, **options):
     traced = trace(automaton)
     variables = fmu_variables(traced, fmi)
-    kinds = options.setdefault("kinds", KINDS)
-    return archive_content(traced, variables, TOKEN, model_code(traced, variables, TOKEN, kinds), fmi=fmi, **options)
+    listed = tuple(source_names(fmi)) if sources else ()
+    description = Description(traced, variables, TOKEN, fmi, kinds, sources=listed, **options)
+    return archive_members(description, model_code(traced, variables, TOKEN, kinds), references=references)
 
 
 @pytest.fixture(scope="module", params=BOTH, ids=lambda fmi: fmi.value)

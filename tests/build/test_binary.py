@@ -11,7 +11,8 @@ import zipfile
 import pytest
 from catalogue import cases
 
-from fmu.build.binaries import OWN_FOLDERS, find_compiler, fmi_headers, own_files
+from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files
+from fmu.build.compiler import find_compiler
 from fmu.describe.variables import Fmi
 from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall

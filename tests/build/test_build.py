@@ -14,16 +14,10 @@ import pytest
 
 import fmu.build.binaries
 import fmu.build.libraries
-from fmu.build.binaries import (
-    BuildError,
-    binaries,
-    check_target,
-    compile_fmu,
-    find_compiler,
-    fmi_headers,
-    package,
-    runtime_sources,
-)
+from fmu.archives.writing import check_target, package
+from fmu.build.binaries import binaries, compile_fmu, fmi_headers, runtime_sources
+from fmu.build.compiler import find_compiler
+from fmu.errors import BuildError
 
 # The smallest library with an FMI function, and what a model's generated code may hold.
 VERSION = """

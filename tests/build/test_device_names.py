@@ -6,7 +6,7 @@ import fmpy
 import pytest
 
 from cosim.cli.main import main
-from fmu.archives.device_names import is_device, no_device
+from fmu.archives.checks import is_device, no_device
 from fmu.describe.description import model_identifier
 
 

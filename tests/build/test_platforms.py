@@ -18,11 +18,12 @@ import pytest
 
 import fmu.build.binaries
 import fmu.build.libraries
-from fmu.build.binaries import BuildError, compile_fmu, fmi_headers
+from fmu.build.binaries import compile_fmu, fmi_headers
 from fmu.build.compiler import cache_folder, is_zig
 from fmu.build.mach_o import export_only, universal
 from fmu.build.platforms import PLATFORMS, chosen_platforms, library_members, this_platform
 from fmu.describe.variables import Fmi
+from fmu.errors import BuildError
 from fmu.validate.binaries.binary import read_binary
 
 VERSION = """

@@ -10,7 +10,7 @@ from small_fmus import DESCRIPTIONS, PLAIN, members, only, write
 
 from cosim.cli.main import main
 from fmu.export import export_fmu
-from fmu.validate.fmu_file import check_fmu
+from fmu.validate.check import check_fmu
 from hybrid_model.models import BouncingBall
 
 
@@ -112,7 +112,7 @@ def test_names_of_strangers_reach_no_terminal(tmp_path, capsys):
 def test_the_static_part_loads_no_native_code_of_the_fmu(tmp_path):
     path = write(tmp_path / "small.fmu", members(3))
     code = (
-        "import sys; from fmu.validate.fmu_file import check_fmu; check_fmu(sys.argv[1], run=False);"
+        "import sys; from fmu.validate.check import check_fmu; check_fmu(sys.argv[1], run=False);"
         "assert 'small' not in open('/proc/self/maps').read()"
     )
     if sys.platform != "linux":

@@ -11,9 +11,9 @@ from cosim.errors import CosimError
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import Ended
-from cosim.slave import Step, Update
 from cosim.system import System
 from hybrid_model.models import BouncingBall
+from hybrid_model.schedule.blocks import Step, Update
 
 
 class Ramp(hm.HybridAutomaton):

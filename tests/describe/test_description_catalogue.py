@@ -8,20 +8,18 @@ from description_cases import BOTH, described, elements, findings, schema
 from lxml import etree
 
 import hybrid_model as hm
-from fmu.describe.description import model_description
-from fmu.describe.fmi2 import fmi2_description
-from fmu.describe.fmi3 import fmi3_description
-from fmu.describe.parts import number, summary
+from fmu.describe.description import summary
+from fmu.describe.model_description import model_description
 from fmu.describe.variables import Bank, Fmi
+from fmu.describe.xml_text import number
 from hybrid_model.models import BouncingBall
 
-WRITERS = {Fmi.V2_0: fmi2_description, Fmi.V3_0: fmi3_description}
 QUICK = ("bouncing_ball", "stiff_thermostat", "newtons_cradle", "agent2_dynamic", "vector_agent", "firefly_network")
 
 
 def check(name, fmi, folder):
     description = described(cases()[name].automaton, fmi, stop_time=1.0, step_size=0.1)
-    document = WRITERS[fmi](description)
+    document = model_description(description)
     validator = schema(fmi)
     assert validator.validate(etree.fromstring(document)), validator.error_log
     assert findings(document, folder, {clock.name for clock in description.automaton.clocks}) == []
@@ -45,8 +43,7 @@ def test_schema_and_fmpy_find_nothing_in_any_model(name, tmp_path):
 
 
 def ball(fmi, **options):
-    description = described(BouncingBall(), fmi)
-    return ET.fromstring(model_description(description.traced, description.variables, "t", fmi=fmi.value, **options))
+    return ET.fromstring(model_description(described(BouncingBall(), fmi, **options)))
 
 
 def test_capabilities_of_fmi_3():
@@ -125,7 +122,7 @@ def test_a_quantity_whose_display_unit_has_an_offset_has_no_declared_type(fmi):
         def flow_map(self, s):
             return {"T": 0.0}
 
-    root = ET.fromstring(WRITERS[fmi](described(Body(), fmi)))
+    root = ET.fromstring(model_description(described(Body(), fmi)))
     typed = {e.get("name"): (e if fmi is Fmi.V3_0 else e[0]).attrib for e in root.find("ModelVariables")}
     assert "declaredType" not in typed["T"]
     assert (typed["T"]["quantity"], typed["T"]["unit"]) == ("ThermodynamicTemperature", "K")
@@ -149,7 +146,7 @@ def test_states_that_no_jump_changes_are_not_reinitialised():
         def jump_map(self, s):
             return {"cycled": 0.0, "kept": s.kept}
 
-    items = elements(fmi3_description(described(Block(), Fmi.V3_0)), "ModelVariables/Float64")
+    items = elements(model_description(described(Block(), Fmi.V3_0)), "ModelVariables/Float64")
     assert {item.get("name"): item.get("reinit") for item in items}["kept"] is None
     assert {item.get("name"): item.get("reinit") for item in items}["cycled"] == "true"
 
@@ -162,7 +159,7 @@ def test_a_variable_may_be_called_like_a_type():
             return {"Length": 0.0}
 
     for fmi in BOTH:
-        document = WRITERS[fmi](described(Block(), fmi))
+        document = model_description(described(Block(), fmi))
         types = {item.get("name") for item in elements(document, "TypeDefinitions/*")}
         names = {item.get("name") for item in elements(document, "ModelVariables/*")}
         assert "LengthType" in types
@@ -170,7 +167,7 @@ def test_a_variable_may_be_called_like_a_type():
 
 
 def test_arrays_have_structural_parameters_as_dimensions():
-    root = ET.fromstring(fmi3_description(described(cases()["agent2_dynamic"].automaton, Fmi.V3_0)))
+    root = ET.fromstring(model_description(described(cases()["agent2_dynamic"].automaton, Fmi.V3_0)))
     variables = {item.get("name"): item for item in root.find("ModelVariables")}
     references = {item.get("valueReference"): name for name, item in variables.items()}
     dimensions = [references[d.get("valueReference")] for d in variables["switching.active"].iter("Dimension")]

@@ -5,7 +5,7 @@ from description_cases import BOTH, described, drawn_automata, elements, finding
 from hypothesis import HealthCheck, given, settings
 from lxml import etree
 
-from fmu.describe.description import model_description
+from fmu.describe.model_description import model_description
 from fmu.describe.terminals import terminals_and_icons
 from fmu.describe.variables import Fmi
 from fmu.errors import ExportError
@@ -31,7 +31,7 @@ def test_drawn_automata(folder, automaton):
             if "rename" not in str(error).lower():
                 raise
             continue
-        document = model_description(description.traced, description.variables, "a token", fmi=fmi)
+        document = model_description(description)
         _valid(SCHEMAS[fmi], document)
         _valid(TERMINALS, terminals_and_icons(description))
         clocks = [names[k] for k, v in enumerate(description.variables) if v.type.name == "CLOCK"]

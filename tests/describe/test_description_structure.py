@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hybrid_model as hm
-from fmu.describe.structure import model_structure
+from fmu.describe.model_structure import model_structure
 from fmu.describe.variables import Bank, Fmi, fmu_variables
 from hybrid_model.models import BouncingBall
 from hybrid_model.native.factors import Factor, factors

@@ -4,13 +4,13 @@ import math
 import xml.etree.ElementTree as ET
 
 import pytest
+from description_cases import described
 
 import hybrid_model as hm
-from fmu.build.content import archive_content
 from fmu.describe.experiment import declared_times, proposed_step
-from fmu.describe.variables import Fmi, fmu_variables
+from fmu.describe.model_description import model_description
+from fmu.describe.variables import Fmi
 from hybrid_model.models import BouncingBall
-from hybrid_model.native.trace import trace
 
 
 class Timed(hm.HybridAutomaton):
@@ -69,10 +69,5 @@ def test_proposed_step(automaton, stop_time, step):
     [({}, "5e-05"), ({"stop_time": 20.0}, "0.05"), ({"stop_time": 20.0, "step_size": 0.25}, "0.25")],
 )
 def test_the_description_says_it(fmi, options, written):
-    traced = trace(Timed())
-    options = {"stop_time": None, "step_size": None, **options}
-    content = archive_content(
-        traced, fmu_variables(traced, fmi), "token", "", fmi=fmi, kinds=("cs", "me"), sources=False, **options
-    )
-    root = ET.fromstring(content["modelDescription.xml"])
+    root = ET.fromstring(model_description(described(Timed(), fmi, **options)))
     assert root.find("DefaultExperiment").get("stepSize") == written

@@ -12,7 +12,8 @@ import struct
 import subprocess
 from pathlib import Path
 
-from fmu.build.binaries import OWN_FOLDERS, find_compiler, fmi_headers, own_files, runtime_sources
+from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files, runtime_sources
+from fmu.build.compiler import find_compiler
 from fmu.build.model_code import model_code
 from fmu.describe.variables import Fmi, fmu_variables
 from hybrid_model import Automaton

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from catalogue import cases
 
-from fmu.build.binaries import COMMON_FLAGS, OWN_FOLDERS, find_compiler
+from fmu.build.binaries import OWN_FOLDERS
+from fmu.build.compiler import find_compiler
+from fmu.build.libraries import COMMON_FLAGS
 from fmu.build.model_code import model_code
 from fmu.describe.variables import Fmi, fmu_variables
 from hybrid_model.declare.variables import Kind

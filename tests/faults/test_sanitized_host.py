@@ -9,7 +9,8 @@ import pytest
 from c_harness import VERSIONS
 from witnesses import Mix
 
-from fmu.build.binaries import OWN_FOLDERS, find_compiler, fmi_headers, runtime_sources
+from fmu.build.binaries import OWN_FOLDERS, fmi_headers, runtime_sources
+from fmu.build.compiler import find_compiler
 from fmu.export import export_fmu
 
 pytestmark = [

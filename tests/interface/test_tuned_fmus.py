@@ -9,8 +9,8 @@ from own_importer import exchange, step_through
 from tuned import CHANGES, JUMPS, POINTS, T_END, TIMES, Tuned, TunedAndDriven, exact
 
 import hybrid_model as hm
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import Severity
-from fmu.validate.fmu_file import check_fmu
 from hybrid_model.native.networks.network import worth_looping
 
 # The engine locates to the last bits; own_importer integrates Model Exchange to 1e-12 and bisects.

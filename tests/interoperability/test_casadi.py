@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
-from fmu.validate.fmu_file import check_fmu
+from fmu.validate.check import check_fmu
 from hybrid_model.models import BouncingBall
 
 VERSIONS = ["2.0", "3.0"]

@@ -9,7 +9,9 @@ import pytest
 from catalogue import cases
 
 import hybrid_model as hm
-from fmu.build.binaries import GENERATED_FLAGS, OWN_FOLDERS, STRICT_FLAGS, find_compiler, own_files
+from fmu.build.binaries import OWN_FOLDERS, own_files
+from fmu.build.compiler import find_compiler
+from fmu.build.libraries import GENERATED_FLAGS, STRICT_FLAGS
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.declare.transitions import Trigger

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lxml import etree
 
 import hybrid_model as hm
-from fmu.describe.parts import Description
+from fmu.describe.description import Description
 from fmu.describe.variables import Fmi, fmu_variables
 from hybrid_model.native.trace import trace
 
@@ -26,7 +26,7 @@ FALSE_FINDING = re.compile(r"InitialUnknowns does not contain .* Expected \{(.*)
 def described(automaton, fmi, **options):
     """The description of an automaton, and its variables."""
     traced = trace(automaton)
-    return Description(traced, fmu_variables(traced, fmi), "a token", **options)
+    return Description(traced, fmu_variables(traced, fmi), "a token", fmi, **options)
 
 
 def schema(fmi, name="ModelDescription"):

@@ -8,8 +8,8 @@ import tempfile
 import zipfile
 from pathlib import Path
 
-from fmu.validate import functions
-from fmu.validate.platforms import EXTENSIONS, this_machine
+from fmu.standard import functions
+from fmu.standard.platforms import EXTENSIONS, this_machine
 
 SOURCE = Path(__file__).with_name("small_fmu.c")
 MACHINE = "-".join(this_machine())

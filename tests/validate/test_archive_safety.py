@@ -10,10 +10,10 @@ import zlib
 import pytest
 from small_fmus import DESCRIPTIONS
 
-from fmu.archives.archive import Archive, ArchiveError, extract_fmu
-from fmu.archives.rules import ArchiveLimits
+from fmu.archives.checks import ArchiveLimits
+from fmu.archives.reading import Archive, ArchiveError, extract_fmu
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import Severity
-from fmu.validate.fmu_file import check_fmu
 
 DESCRIPTION = ("modelDescription.xml", DESCRIPTIONS[3].encode())
 

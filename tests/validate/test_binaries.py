@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_fmus import EXTENSION, binary
 
+from fmu.standard.functions import required
 from fmu.validate.binaries.binary import read_binary
 from fmu.validate.binaries.shared_library import BinaryError
-from fmu.validate.functions import required
 
 PLACES = Path(fmpy.__path__[0])
 CONTAINERS = sorted((PLACES / "container_fmu" / "binaries").rglob("container_fmu.*"))

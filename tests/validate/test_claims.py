@@ -9,8 +9,8 @@ from small_fmus import DESCRIPTIONS, SCHEDULED, members, only, write
 
 import hybrid_model as hm
 from fmu.export import export_fmu
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import Severity
-from fmu.validate.fmu_file import check_fmu
 
 SOUND, DISCARDS = "-DCLAIMED=0", "-DCLAIMED=2"
 

@@ -6,9 +6,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from small_fmus import DESCRIPTIONS, SCHEDULED, binary, members, write
 
-from fmu.archives.archive import Archive, ArchiveError
+from fmu.archives.reading import Archive, ArchiveError
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import Report, Severity
-from fmu.validate.fmu_file import check_fmu
 
 FUZZ = settings(
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]

@@ -6,8 +6,8 @@ import zipfile
 import pytest
 
 from fmu.export import export_fmu
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import Severity
-from fmu.validate.fmu_file import check_fmu
 from hybrid_model.models import BouncingBall
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import Severity
-from fmu.validate.fmu_file import check_fmu
 
 FOLDER = os.environ.get("HYBRID_FMU_REFERENCE_FMUS")
 FILES = sorted(Path(FOLDER).rglob("*.fmu")) if FOLDER else []

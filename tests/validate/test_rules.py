@@ -4,9 +4,9 @@
 import pytest
 from small_fmus import DESCRIPTIONS, EXTENSION, FOLDERS, MACHINE, SCHEDULED, binary, members, write
 
+from fmu.standard.platforms import parts_of
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import LIMIT, Severity
-from fmu.validate.fmu_file import check_fmu
-from fmu.validate.platforms import parts_of
 
 X3 = '<Float64 name="x" valueReference="1" initial="exact" start="1" unit="m" min="-10" max="10"/>'
 DER3 = '<Float64 name="der(x)" valueReference="2" derivative="1"/>'

@@ -8,9 +8,9 @@ import time
 import pytest
 from small_fmus import DESCRIPTIONS, EXTENSION, PLAIN, SCHEDULED, members, only, write
 
-from fmu.validate.child_process import RunLimits
+from fmu.validate.check import check_fmu
 from fmu.validate.findings import Severity
-from fmu.validate.fmu_file import check_fmu
+from fmu.validate.smoke.child_process import RunLimits
 
 # Generous for a machine under load: only what hangs takes all of it.
 LIMITS = RunLimits(seconds=30.0, memory=512 << 20)
@@ -261,7 +261,7 @@ def test_the_host_keeps_its_folder_and_leaves_no_file(tmp_path):
     temporary = tmp_path / "temporary"
     temporary.mkdir()
     code = (
-        "import os, sys; from fmu.validate.fmu_file import check_fmu; before = os.getcwd(), dict(os.environ)\n"
+        "import os, sys; from fmu.validate.check import check_fmu; before = os.getcwd(), dict(os.environ)\n"
         "report = check_fmu(sys.argv[1]); assert not report.ok; assert before == (os.getcwd(), dict(os.environ))"
     )
     subprocess.run(

@@ -3,7 +3,7 @@
 import pytest
 from small_fmus import DESCRIPTIONS, members, write
 
-from fmu.validate.fmu_file import check_fmu
+from fmu.validate.check import check_fmu
 
 
 @pytest.mark.parametrize("major", [2, 3])

@@ -7,8 +7,8 @@ import zipfile
 import pytest
 from small_fmus import DESCRIPTIONS, SCHEDULED, members, write
 
-from fmu.validate.fmu_file import check_fmu
-from fmu.validate.xml_file import XmlError, XmlLimits, as_utf8, parse, schema_findings
+from fmu.validate.check import check_fmu
+from fmu.validate.reading.xml_file import XmlError, XmlLimits, as_utf8, parse, schema_findings
 
 TEXT = DESCRIPTIONS[3]
 LAUGHS = (
@@ -102,7 +102,7 @@ def test_a_hundred_megabytes_stay_below_a_memory_limit(tmp_path):
     )
     code = (
         "import resource, sys; resource.setrlimit(resource.RLIMIT_AS, (1 << 30, 1 << 30));"
-        "from fmu.validate.fmu_file import check_fmu; r = check_fmu(sys.argv[1], run=False); print([f.rule for f "
+        "from fmu.validate.check import check_fmu; r = check_fmu(sys.argv[1], run=False); print([f.rule for f "
         "in r.findings])"
     )
     done = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)

@@ -6,13 +6,14 @@ import re
 from collections.abc import Iterator, Mapping
 from pathlib import PurePosixPath
 
-from fmu.archives.archive import Archive
-from fmu.validate import functions
+from fmu.archives.reading import Archive
+from fmu.standard.capabilities import promised
+from fmu.standard.functions import required
+from fmu.standard.platforms import EXTENSIONS, FMI2, parts_of
 from fmu.validate.binaries.binary import read_binary
 from fmu.validate.binaries.shared_library import Binary, BinaryError
-from fmu.validate.description import Description
 from fmu.validate.findings import Finding, error, note, quoted, warning
-from fmu.validate.platforms import EXTENSIONS, FMI2, parts_of
+from fmu.validate.reading.description import Description
 
 PLACES = "FMI 2.0.4 section 2.3; FMI 3.0.2 section 2.5.1"
 FUNCTIONS = "FMI 2.0.4 sections 2.1, 3.2 and 4.2; FMI 3.0.2 section 2.5"
@@ -147,15 +148,15 @@ def _library(name: str, binary: Binary, machine: str, system: str) -> Iterator[F
 def _symbols(
     name: str, binary: Binary, description: Description, kinds: dict[str, Mapping[str, str]]
 ) -> Iterator[Finding]:
-    required: dict[str, str] = {}
+    wanted: dict[str, str] = {}
     for kind, attributes in kinds.items():
-        for function in functions.required(description.major, kind):
-            required.setdefault(function, f"{kind} needs it")
-        for function, flag in functions.of_flags(description.major, attributes).items():
-            required[function] = f"{kind} says {flag}"
-    missing = [function for function in sorted(required) if function not in binary.exports]
+        for function in required(description.major, kind):
+            wanted.setdefault(function, f"{kind} needs it")
+        for function, flag in promised(description.major, attributes).items():
+            wanted[function] = f"{kind} says {flag}"
+    missing = [function for function in sorted(wanted) if function not in binary.exports]
     if missing:
-        shown = ", ".join(f"{function} ({required[function]})" for function in missing[:6])
+        shown = ", ".join(f"{function} ({wanted[function]})" for function in missing[:6])
         more = f" and {len(missing) - 6} more" if len(missing) > 6 else ""
         yield error(
             "symbol.missing",
@@ -174,11 +175,11 @@ def _symbols(
         else:  # names are looked up library by library
             yield note("symbol.exported", f"{beside}.")
     for runtime, pattern in _RUNTIMES.items():
-        wanted = sorted(symbol for symbol in binary.imports if pattern.fullmatch(symbol))
-        if wanted:
+        called = sorted(symbol for symbol in binary.imports if pattern.fullmatch(symbol))
+        if called:
             yield warning(
                 "symbol.runtime",
-                f"{name} needs {wanted[0]} and {len(wanted) - 1} more functions of {runtime}: it loads only "
+                f"{name} needs {called[0]} and {len(called) - 1} more functions of {runtime}: it loads only "
                 "into a process, or "
                 f"on a machine, that has just this {runtime}. Export native code.",
                 "FMI 2.0.4 section 2.3; FMI 3.0.2 section 2.5.1: external libraries",

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fmu.archives.archive import Archive
-from fmu.validate.description import Description
+from fmu.archives.reading import Archive
 from fmu.validate.findings import Finding, error, note, quoted, softened, warning
+from fmu.validate.reading.description import Description
+from fmu.validate.reading.xml_members import tree
 from fmu.validate.rules.sources import source_findings
 from fmu.validate.rules.terminals import terminal_findings
-from fmu.validate.xml_members import tree
 
 LAYERED = "FMI 3.0.2 section 2.6"
 _MANIFEST = "http://fmi-standard.org/fmi-ls-manifest"

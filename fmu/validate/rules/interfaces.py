@@ -6,8 +6,9 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 
-from fmu.validate.description import Description, Variable, true
+from fmu.standard.capabilities import Capability
 from fmu.validate.findings import Finding, error, quoted, warning
+from fmu.validate.reading.description import Description, Variable
 
 FLAGS = "FMI 2.0.4 sections 3.3.1 and 4.3.1; FMI 3.0.2 sections 2.4.6 and 4.3"
 CLOCKS = "FMI 3.0.2 sections 2.2.8 and 2.4.7.5"
@@ -38,15 +39,8 @@ def _flags(description: Description, kind: str, flags: Mapping[str, str]) -> Ite
             f"{kind}: the modelIdentifier {quoted(identifier)} is no C identifier: rename it.",
             FLAGS,
         )
-    get, serialize = (
-        ("canGetAndSetFMUstate", "canSerializeFMUstate")
-        if description.major == 2
-        else (
-            "canGetAndSetFMUState",
-            "canSerializeFMUState",
-        )
-    )
-    if true(flags, serialize) and not true(flags, get):
+    get, serialize = (c.attribute(description.major) for c in (Capability.STATE, Capability.SERIALIZATION))
+    if description.can(kind, Capability.SERIALIZATION) and not description.can(kind, Capability.STATE):
         yield error(
             "interface.flags", f"{kind}: {serialize} is true and {get} is not: what is serialised is got first.", FLAGS
         )
@@ -55,23 +49,22 @@ def _flags(description: Description, kind: str, flags: Mapping[str, str]) -> Ite
         yield error("interface.flags", f"{kind}: fixedInternalStepSize is {fixed:g}; it must be positive.", FLAGS)
     if kind != "CoSimulation" or description.major == 2:
         return
-    if true(flags, "canReturnEarlyAfterIntermediateUpdate") and not true(flags, "providesIntermediateUpdate"):
+    updates = description.can(kind, Capability.INTERMEDIATE_UPDATE)
+    if description.can(kind, Capability.RETURN_AFTER_UPDATE) and not updates:
         yield error(
             "interface.flags",
             "CoSimulation: canReturnEarlyAfterIntermediateUpdate is true and providesIntermediateUpdate is not: "
             "the return is asked for in the intermediate update.",
             FLAGS,
         )
-    if flags.get("recommendedIntermediateInputSmoothness", "0") != "0" and not true(
-        flags, "providesIntermediateUpdate"
-    ):
+    if flags.get("recommendedIntermediateInputSmoothness", "0") != "0" and not updates:
         yield error(
             "interface.flags",
             "CoSimulation: recommendedIntermediateInputSmoothness is given and providesIntermediateUpdate is not true.",
             FLAGS,
         )
     clocks = [variable.name for variable in description.variables if variable.type == "Clock"]
-    if clocks and not true(flags, "hasEventMode"):
+    if clocks and not description.can(kind, Capability.EVENT_MODE):
         yield error(
             "clock.event_mode",
             f"CoSimulation: there is the clock {quoted(clocks[0])} but hasEventMode is not true: clocks tick "

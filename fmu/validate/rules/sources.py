@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fmu.archives.archive import Archive
-from fmu.validate.description import Description
+from fmu.archives.reading import Archive
+from fmu.standard.platforms import parts_of
 from fmu.validate.findings import Finding, error, quoted, softened, warning
-from fmu.validate.platforms import parts_of
-from fmu.validate.xml_members import checked
+from fmu.validate.reading.description import Description
+from fmu.validate.reading.xml_members import checked
 
 SOURCES = "FMI 2.0.4 section 2.3; FMI 3.0.2 section 2.5.1.4"
 _BUILD = "sources/buildDescription.xml"

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 from lxml import etree
 
-from fmu.archives.archive import Archive
-from fmu.validate.description import Description
+from fmu.archives.reading import Archive
 from fmu.validate.findings import Finding, error, quoted, softened, warning
-from fmu.validate.xml_members import checked
+from fmu.validate.reading.description import Description
+from fmu.validate.reading.xml_members import checked
 
 TERMINALS = "FMI 3.0.2 section 2.4.9"
 _TERMINALS = "terminalsAndIcons/terminalsAndIcons.xml"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from fmu.validate.description import Description
 from fmu.validate.findings import Finding, error, quoted, warning
+from fmu.validate.reading.description import Description
 
 UNITS = "FMI 2.0.4 section 2.2.2; FMI 3.0.2 section 2.4.3"
 

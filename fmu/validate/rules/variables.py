@@ -6,8 +6,8 @@ import math
 import re
 from collections.abc import Iterator
 
-from fmu.validate.description import FLOATS, INTEGERS, Description, Variable
 from fmu.validate.findings import Finding, error, quoted, warning
+from fmu.validate.reading.description import FLOATS, INTEGERS, Description, Variable
 
 ATTRIBUTES = "FMI 2.0.4 section 2.2.7; FMI 3.0.2 section 2.4.7"
 NAMES = "FMI 2.0.4 section 2.2.9; FMI 3.0.2 section 2.4.7.5.1"

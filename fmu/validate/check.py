@@ -8,21 +8,21 @@ from pathlib import Path
 
 from lxml import etree
 
-from fmu.archives.archive import Archive, ArchiveError
-from fmu.archives.rules import DESCRIPTION, LIMITS, ArchiveLimits
+from fmu.archives.checks import DESCRIPTION, LIMITS, ArchiveLimits
+from fmu.archives.reading import Archive, ArchiveError
 from fmu.importer.unpacking import unpack
-from fmu.validate.child_process import RunLimits
-from fmu.validate.description import Description, read_description
 from fmu.validate.findings import Finding, Report, error, note, quoted, warning
-from fmu.validate.fmpy_findings import fmpy_findings
+from fmu.validate.reading.description import Description, read_description
+from fmu.validate.reading.xml_file import XmlError, as_utf8, parse, require_size, schema_findings
 from fmu.validate.rules.binaries import binary_findings
 from fmu.validate.rules.files import file_findings
+from fmu.validate.rules.fmpy_validation import fmpy_findings
 from fmu.validate.rules.interfaces import interface_findings
 from fmu.validate.rules.structure import structure_findings
 from fmu.validate.rules.units import unit_findings
 from fmu.validate.rules.variables import variable_findings
-from fmu.validate.smoke import run_fmu
-from fmu.validate.xml_file import XmlError, as_utf8, parse, require_size, schema_findings
+from fmu.validate.smoke.child_process import RunLimits
+from fmu.validate.smoke.smoke_run import run_fmu
 
 SAFETY = "FMI 3.0.2 section 2.5: ZIP with store or deflate, no encryption, '/' between folders"
 _REMARKS = {"backslash": error, "duplicate": warning}

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from fmu.validate.description import Description, Variable, true
-from fmu.validate.plan import DIRECTIONAL, LARGEST_ARRAY, entry, is_smooth_scalar, smooth_knowns, smooth_unknowns
+from fmu.standard.capabilities import Capability
+from fmu.validate.reading.description import Description, Variable
+from fmu.validate.smoke.plan import LARGEST_ARRAY, entry, is_smooth_scalar, smooth_knowns, smooth_unknowns
 
 _ORDERS = 10
 """Orders of output derivatives that are asked for."""
@@ -29,7 +30,6 @@ def claims(description: Description, kind: str) -> dict[str, dict[str, Any]]:
     dict
         Only experiments that have something to ask for.
     """
-    attributes = description.interfaces[kind]
     experiments: dict[str, dict[str, Any]] = {}
     values, parameters = _exact(description)
     if values or parameters:
@@ -38,7 +38,7 @@ def claims(description: Description, kind: str) -> dict[str, dict[str, Any]]:
             "exact": values,
             "exact_parameters": parameters,
         }
-    order = int(attributes.get("maxOutputDerivativeOrder", "0"))
+    order = int(description.interfaces[kind].get("maxOutputDerivativeOrder", "0"))
     outputs = [v for v in description.variables if v.causality == "output" and is_smooth_scalar(v)]
     if kind == "CoSimulation" and order > 1 and outputs:
         experiments["orders of output derivatives"] = {
@@ -48,21 +48,21 @@ def claims(description: Description, kind: str) -> dict[str, dict[str, Any]]:
             "claim_output": entry(description, outputs[0]),
         }
     inputs = [v for v in description.variables if v.causality == "input" and is_smooth_scalar(v)]
-    if kind == "CoSimulation" and true(attributes, "canInterpolateInputs") and inputs:
+    if kind == "CoSimulation" and description.can(kind, Capability.INPUT_DERIVATIVES) and inputs:
         experiments["input derivatives"] = {
             "experiment": "input_derivatives",
             "claim_input": entry(description, inputs[0]),
         }
-    has_events = kind == "ModelExchange" or (kind == "CoSimulation" and true(attributes, "hasEventMode"))
-    if has_events and true(attributes, "providesEvaluateDiscreteStates"):
+    has_events = kind == "ModelExchange" or (kind == "CoSimulation" and description.can(kind, Capability.EVENT_MODE))
+    if has_events and description.can(kind, Capability.EVALUATION):
         experiments["evaluation of discrete states"] = {"experiment": "evaluation"}
     unknowns = _unknowns(description)
-    if true(attributes, "providesPerElementDependencies") and unknowns:
+    if description.can(kind, Capability.ELEMENT_DEPENDENCIES) and unknowns:
         experiments["dependencies of elements"] = {
             "experiment": "element_dependencies",
             "claim_unknowns": [entry(description, unknown) for unknown in unknowns],
         }
-    directional = kind != "ScheduledExecution" and any(true(attributes, name) for name in DIRECTIONAL)
+    directional = kind != "ScheduledExecution" and description.can(kind, Capability.DIRECTIONAL_DERIVATIVES)
     left_out = _left_out(description) if directional else []
     if left_out:
         experiments["dependencies"] = {"experiment": "dependencies", "left_out": left_out}

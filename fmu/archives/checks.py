@@ -13,11 +13,11 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from fmu.archives.device_names import is_device
-
 ENCRYPTED, STORED, DEFLATED = 0x1, 0, 8
 DESCRIPTION = "modelDescription.xml"
 _LOCAL_HEADER = 30
+_DEVICES = frozenset({"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))})
+"""Names that Windows keeps for devices: no file there can be called so, with or without an ending."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +113,16 @@ def _member_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator
             f"The member {shown} unpacks {ratio:.0f}-fold to {member.file_size} bytes; "
             f"at most {limits.ratio:g}-fold is accepted: it looks like a decompression bomb.",
         )
+
+
+def is_device(name: str) -> bool:
+    """Whether the name of a file or folder stands for a device on Windows."""
+    return name.partition(".")[0].lower() in _DEVICES
+
+
+def no_device(name: str) -> str:
+    """Return `name`, or a name near to it that stands for no device."""
+    return f"_{name}" if is_device(name) else name
 
 
 def name_of(member: zipfile.ZipInfo) -> str:

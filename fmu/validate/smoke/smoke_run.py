@@ -6,13 +6,14 @@ import dataclasses
 from pathlib import Path
 from typing import Any
 
-from fmu.validate.child_process import RunLimits, run_experiment
-from fmu.validate.description import Description, true
+from fmu.standard.capabilities import DERIVATIVES, Capability
+from fmu.standard.platforms import EXTENSIONS, parts_of, runs_here, this_machine
 from fmu.validate.findings import Finding, note, quoted, softened
-from fmu.validate.plan import ADJOINT, DIRECTIONAL, LARGEST_ARRAY, plan_of
-from fmu.validate.plan_claims import claims
-from fmu.validate.plan_moves import moves
-from fmu.validate.platforms import EXTENSIONS, parts_of, runs_here, this_machine
+from fmu.validate.reading.description import Description
+from fmu.validate.smoke.child_process import RunLimits, run_experiment
+from fmu.validate.smoke.claims import claims
+from fmu.validate.smoke.moves import moves
+from fmu.validate.smoke.plan import LARGEST_ARRAY, plan_of
 
 MISUSE = ("token", "bad steps")
 """Experiments that do what no importer does."""
@@ -46,14 +47,14 @@ def run_fmu(folder: Path, description: Description, limits: RunLimits) -> tuple[
                 note("run.platform", f"{kind} was not run: there is no binary for this machine, {machine}.")
             )
             continue
-        if true(attributes, "needsExecutionTool"):
+        if description.can(kind, Capability.EXECUTION_TOOL):
             findings.append(
                 note("run.tool", f"{kind} was not run: it needs its tool at run time (needsExecutionTool).")
             )
             continue
         plan = plan_of(folder, binary, description, kind)
         found = _run_kind(
-            plan, {**_experiments(kind, attributes), **claims(description, kind), **moves(description, kind)}, limits
+            plan, {**_experiments(description, kind), **claims(description, kind), **moves(description, kind)}, limits
         )
         if not any(finding.rule == "run.library" for _, finding in found):
             executed.append(kind)
@@ -105,20 +106,19 @@ def _binary(folder: Path, identifier: str) -> Path | None:
     return None
 
 
-def _experiments(kind: str, attributes: Any) -> dict[str, dict[str, Any]]:
+def _experiments(description: Description, kind: str) -> dict[str, dict[str, Any]]:
     """Return what each experiment changes in the plan, by its name in messages."""
     experiments: dict[str, dict[str, Any]] = {
         "life cycle": {"experiment": "life_cycle"},
         "token": {"experiment": "token"},
     }
-    if kind == "CoSimulation" and true(attributes, "hasEventMode"):
+    if kind == "CoSimulation" and description.can(kind, Capability.EVENT_MODE):
         # Most importers leave event mode off: the FMU then handles its events inside.
         experiments[WITHOUT_EVENT_MODE] = {"experiment": "life_cycle", "event_mode": False}
-    if true(attributes, "canGetAndSetFMUstate") or true(attributes, "canGetAndSetFMUState"):
+    if description.can(kind, Capability.STATE):
         experiments["state"] = {"experiment": "state"}
     if kind == "CoSimulation":
         experiments["bad steps"] = {"experiment": "bad_steps"}
-    directional = any(true(attributes, name) for name in (*DIRECTIONAL, ADJOINT))
-    if kind != "ScheduledExecution" and (directional or attributes.get("maxOutputDerivativeOrder", "0") != "0"):
+    if kind != "ScheduledExecution" and any(description.can(kind, capability) for capability in DERIVATIVES):
         experiments["derivatives"] = {"experiment": "derivatives"}
     return experiments

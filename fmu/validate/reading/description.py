@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from fmu.standard.capabilities import Capability
+
 KINDS = ("CoSimulation", "ModelExchange", "ScheduledExecution")
 FLOATS = ("Real", "Float32", "Float64")
 INTEGERS = ("Integer", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Enumeration")
@@ -158,17 +160,16 @@ class Description:
             size *= int(length.start[0])
         return size
 
+    def can(self, kind: str, capability: Capability) -> bool:
+        """Return whether an interface type claims a capability."""
+        return capability.claimed(self.interfaces[kind], self.major)
+
     def attribute(self, variable: Variable, name: str) -> str | None:
         """Return an attribute of a variable, or else of its declared type."""
         if name in variable.attributes:
             return variable.attributes[name]
         declared = self.types.get(variable.attributes.get("declaredType", ""))
         return declared[1].get(name) if declared else None
-
-
-def true(attributes: Mapping[str, str], name: str) -> bool:
-    """Return a Boolean attribute, which is false where it is absent."""
-    return attributes.get(name, "false") in ("true", "1")
 
 
 def read_description(root: etree._Element) -> Description:

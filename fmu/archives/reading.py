@@ -1,6 +1,6 @@
 """The archive of an FMU: looked at before anything is written, then extracted.
 
-This module and `fmu.archives.rules` need only the standard library and nothing of the exporter, so that importers
+This module and `fmu.archives.checks` need only the standard library and nothing of the exporter, so that importers
 may use them too.
 """
 
@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
-from fmu.archives.rules import LIMITS, ArchiveLimits, is_folder, name_of, problems_of, remarks_of
+from fmu.archives.checks import LIMITS, ArchiveLimits, is_folder, name_of, problems_of, remarks_of
 
 BROKEN = (
     zipfile.BadZipFile,

@@ -9,8 +9,8 @@ from pathlib import Path
 from fmpy import read_model_description
 from fmpy.model_description import ValidationError
 
-from fmu.validate.description import Description
 from fmu.validate.findings import Finding, error, note
+from fmu.validate.reading.description import Description
 
 _MANY = 5
 _INITIAL = re.compile(r".*InitialUnknowns does not contain.*Expected \{(.*)\} but was \{(.*)\}\.", re.DOTALL)

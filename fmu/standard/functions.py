@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from fmu.validate.description import true
-
 _COMMON2 = """\
 GetTypesPlatform GetVersion SetDebugLogging Instantiate FreeInstance SetupExperiment EnterInitializationMode
 ExitInitializationMode Terminate Reset GetReal GetInteger GetBoolean GetString SetReal SetInteger SetBoolean
@@ -36,33 +32,25 @@ _OF_KIND = {
         "ScheduledExecution": f"{_COMMON3} {_SE3}",
     },
 }
-_OF_FLAG = {
-    "canGetAndSetFMUstate": "GetFMUstate SetFMUstate FreeFMUstate",
-    "canSerializeFMUstate": "SerializedFMUstateSize SerializeFMUstate DeSerializeFMUstate",
-    "canGetAndSetFMUState": "GetFMUState SetFMUState FreeFMUState",
-    "canSerializeFMUState": "SerializedFMUStateSize SerializeFMUState DeserializeFMUState",
-    "providesDirectionalDerivative": "GetDirectionalDerivative",
-    "providesDirectionalDerivatives": "GetDirectionalDerivative",
-    "providesAdjointDerivatives": "GetAdjointDerivative",
-    "providesEvaluateDiscreteStates": "EvaluateDiscreteStates",
-    "providesPerElementDependencies": "GetNumberOfVariableDependencies GetVariableDependencies",
-    "hasEventMode": "EnterEventMode EnterStepMode UpdateDiscreteStates",
+_SPELLED2 = {
+    "GetFMUState": "GetFMUstate",
+    "SetFMUState": "SetFMUstate",
+    "FreeFMUState": "FreeFMUstate",
+    "SerializedFMUStateSize": "SerializedFMUstateSize",
+    "SerializeFMUState": "SerializeFMUstate",
+    "DeserializeFMUState": "DeSerializeFMUstate",
+    "GetContinuousStateDerivatives": "GetDerivatives",
+    "GetOutputDerivatives": "GetRealOutputDerivatives",
+    "UpdateDiscreteStates": "NewDiscreteStates",
 }
+"""Functions that FMI 2.0 has under another name than FMI 3.0."""
+
+
+def function(major: int, name: str) -> str:
+    """Return the name that a function of FMI 3.0 has in a version, ``fmi2GetFMUstate`` for ``GetFMUState``."""
+    return f"fmi{major}{_SPELLED2.get(name, name) if major == 2 else name}"
 
 
 def required(major: int, kind: str) -> list[str]:
     """Return the functions that an FMU of an interface type exports, whatever its capabilities."""
     return [f"fmi{major}{name}" for name in _OF_KIND[major].get(kind, "").split()]
-
-
-def of_flags(major: int, attributes: Mapping[str, str]) -> dict[str, str]:
-    """Return the functions that the capability flags promise, each with its flag."""
-    promised = {
-        f"fmi{major}{name}": flag
-        for flag, names in _OF_FLAG.items()
-        if true(attributes, flag)
-        for name in names.split()
-    }
-    if attributes.get("maxOutputDerivativeOrder", "0") != "0":
-        promised[f"fmi{major}Get{'Real' if major == 2 else ''}OutputDerivatives"] = "maxOutputDerivativeOrder"
-    return promised

@@ -19,7 +19,7 @@ from fmu.validate.child.calls import PLACE_BYTES
 from fmu.validate.findings import Finding, Severity, error, note, quoted, warning
 
 LIFE_CYCLE = "FMI 2.0.4 sections 3.2 and 4.2; FMI 3.0.2 sections 2.3, 3.2 and 4.2"
-_ROOT = Path(__file__).resolve().parents[2]
+_ROOT = Path(__file__).resolve().parents[3]
 _START = """\
 import sys
 sys.path.insert(0, sys.argv[1])
@@ -54,7 +54,7 @@ def run_experiment(plan: dict[str, Any], limits: RunLimits) -> Iterator[Finding]
     Parameters
     ----------
     plan : dict
-        From `fmu.validate.plan.plan_of`, with the name of the experiment.
+        From `fmu.validate.smoke.plan.plan_of`, with the name of the experiment.
     limits : RunLimits
     """
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-", ignore_cleanup_errors=True) as name:

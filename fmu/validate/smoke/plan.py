@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from fmu.importer.unpacking import resource_location
+from fmu.standard.capabilities import Capability
 from fmu.validate.child.experiments import POINTS
-from fmu.validate.description import Description, Unknown, Variable, true
+from fmu.validate.reading.description import Description, Unknown, Variable
 
 LARGEST_ARRAY = 1_000_000
 """Elements of an array that is read."""
 _JACOBIAN = 20
 """Rows and columns of the Jacobian that are asked for."""
-DIRECTIONAL = ("providesDirectionalDerivative", "providesDirectionalDerivatives")
-ADJOINT = "providesAdjointDerivatives"
 
 
 def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> dict[str, Any]:
@@ -35,8 +35,9 @@ def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> 
     dict
         As JSON takes it.
     """
-    attributes = description.interfaces[kind]
-    start, stop, step, points = _times(description, attributes)
+    can = partial(description.can, kind)
+    directional, adjoint = can(Capability.DIRECTIONAL_DERIVATIVES), can(Capability.ADJOINT_DERIVATIVES)
+    start, stop, step, points = _times(description, description.interfaces[kind])
     states = [description.referred(unknown.reference) for unknown in description.structure["derivatives"]]
     indicators = [description.referred(unknown.reference) for unknown in description.structure["indicators"]]
     return {
@@ -47,25 +48,21 @@ def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> 
         "token": description.token,
         "variables": [entry(description, variable) for variable in description.variables],
         "clocks": any(variable.type == "Clock" for variable in description.variables),
-        "event_mode": kind == "CoSimulation" and true(attributes, "hasEventMode"),
-        "variable_step": true(attributes, "canHandleVariableCommunicationStepSize"),
-        "once": true(attributes, "canBeInstantiatedOnlyOncePerProcess"),
-        "serialize": true(attributes, "canSerializeFMUstate") or true(attributes, "canSerializeFMUState"),
-        "completed_step": (
-            not true(attributes, "completedIntegratorStepNotNeeded")
-            if description.major == 2
-            else true(attributes, "needsCompletedIntegratorStep")
-        ),
+        "event_mode": kind == "CoSimulation" and can(Capability.EVENT_MODE),
+        "variable_step": can(Capability.VARIABLE_STEP),
+        "once": can(Capability.ONCE_PER_PROCESS),
+        "serialize": can(Capability.SERIALIZATION),
+        "completed_step": can(Capability.COMPLETED_STEP),
         "states": sum(description.size(state) or 0 for state in states if state is not None),
         "indicators": (
             description.number_of_indicators
             if description.major == 2
             else sum(description.size(indicator) or 0 for indicator in indicators if indicator is not None)
         ),
-        "jacobian": _jacobian(description) if any(true(attributes, name) for name in (*DIRECTIONAL, ADJOINT)) else [],
-        "directional": any(true(attributes, name) for name in DIRECTIONAL),
-        "adjoint": true(attributes, ADJOINT),
-        "output_derivatives": _differentiable_outputs(description, attributes),
+        "jacobian": _jacobian(description) if directional or adjoint else [],
+        "directional": directional,
+        "adjoint": adjoint,
+        "output_derivatives": _differentiable_outputs(description) if can(Capability.OUTPUT_DERIVATIVES) else [],
         "start": start,
         "stop": stop,
         "step": step,
@@ -123,9 +120,7 @@ def smooth_knowns(description: Description) -> dict[int, Variable]:
     return {n: v for n, v in numbered if (n in states or v.causality == "input") and is_smooth_scalar(v)}
 
 
-def _differentiable_outputs(description: Description, attributes: Any) -> list[int]:
-    if attributes.get("maxOutputDerivativeOrder", "0") == "0":
-        return []
+def _differentiable_outputs(description: Description) -> list[int]:
     outputs = [v for v in description.variables if v.causality == "output" and is_smooth_scalar(v)]
     return [variable.reference for variable in outputs[:_JACOBIAN]]
 

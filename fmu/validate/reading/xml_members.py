@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from lxml import etree
 
-from fmu.archives.archive import Archive, ArchiveError
+from fmu.archives.reading import Archive, ArchiveError
 from fmu.validate.findings import Finding, error
-from fmu.validate.xml_file import XmlError, as_utf8, parse, require_size, schema_findings
+from fmu.validate.reading.xml_file import XmlError, as_utf8, parse, require_size, schema_findings
 
 
 def tree(archive: Archive, name: str) -> tuple[etree._Element | None, list[Finding]]:

@@ -1,0 +1,4 @@
+"""The smoke run: which experiments are made on an FMU, what each is told, and the child process that makes it.
+
+It imports the description as read, and of `fmu.validate.child` what both sides of the pipe must know.
+"""
