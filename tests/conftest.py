@@ -1,8 +1,12 @@
+import functools
 import hashlib
 import os
+import re
 import time
 
 import pytest
+from fmi_driver.binary import Binary
+from fmi_driver.journey import SETTINGS, instance
 from hypothesis import HealthCheck, settings
 
 from fmu.export import export_fmu
@@ -50,3 +54,30 @@ def exported(tmp_path_factory):
         return path
 
     return export
+
+
+@pytest.fixture(scope="session")
+def binary(exported):
+    """Load the FMU of a class of automata in a version, once a session."""
+
+    @functools.cache
+    def load(automaton, fmi="3.0"):
+        key = re.sub(r"(?<!^)(?=[A-Z])", "_", automaton.__name__).lower()
+        return Binary(exported(automaton(), key, fmi))
+
+    return load
+
+
+@pytest.fixture
+def make(binary):
+    """Make an instance of a class of automata in a setting; it is freed at the end of the test."""
+    made = []
+
+    def make(automaton, label, **options):
+        made.append(instance(binary(automaton, SETTINGS[label]["fmi"]), label, **options))
+        return made[-1]
+
+    yield make
+    for component in made:
+        if component.handle is not None:
+            component.free()

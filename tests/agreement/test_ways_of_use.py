@@ -6,10 +6,12 @@ events), and for the witnesses the run in closed form.
 
 import itertools
 
-import fmu_driver
 import numpy as np
 import pytest
 from catalogue import cases
+from fmi_driver.binary import OK, Binary
+from fmi_driver.component import Component, Step
+from fmi_driver.runs import advance
 from hypothesis import Phase, assume, given, settings
 from hypothesis import strategies as st
 from witnesses import Cascade, FlowFirst, Hill, Mix, Ramps, Timers, random_automaton
@@ -33,18 +35,6 @@ WAYS = {
 TIMED = ("next event time obeyed", "next event time ignored")  # the ways that show the time of each jump
 
 
-@pytest.fixture(scope="module")
-def library(exported):
-    found = {}
-
-    def load(automaton, key):
-        if key not in found:
-            found[key] = fmu_driver.Library(exported(automaton, key))
-        return found[key]
-
-    return load
-
-
 def communication_points(way, t_start, t_end, n, needed=(), seed=0):
     """Points of a way of use: a grid, or random ones, or just the ends; and those that are needed in any case."""
     if WAYS[way].get("once"):
@@ -56,11 +46,11 @@ def communication_points(way, t_start, t_end, n, needed=(), seed=0):
     return sorted({float(t) for t in grid} | {float(t) for t in needed})
 
 
-def run(library, way, points, *, start=None, changes=(), stop=True):
+def run(loaded, way, points, *, start=None, changes=(), stop=True):
     use = WAYS[way]
-    instance = fmu_driver.Instance(library, events=use["events"], early=use["early"])
+    instance = Component(loaded, events=use["events"], early=use["early"])
     instance.initialize(points[0], points[-1] if stop else None, **(start or {}))
-    record = fmu_driver.advance(instance, points, obey=use.get("obey", False), changes=changes)
+    record = advance(instance, points, obey=use.get("obey", False), changes=changes)
     instance.free()
     return record
 
@@ -129,9 +119,9 @@ def references():
 
 
 @pytest.mark.parametrize("name", list(cases()))
-def test_every_model_in_every_way(name, library, references):
+def test_every_model_in_every_way(name, exported, references):
     case, arc = cases()[name], references(name)
-    loaded = library(case.automaton, name)
+    loaded = Binary(exported(case.automaton, name))
     changes = [(t, port, value) for port, rows in case.steps.items() for t, value in rows]
     for way in WAYS:
         points = communication_points(way, 0.0, case.t_end, 37, [t for t, _, _ in changes])
@@ -150,7 +140,7 @@ UNIT = st.floats(0.0, 1.0)
 
 @settings(max_examples=25, deadline=None, phases=[Phase.explicit, Phase.generate])
 @given(data=st.data())
-def test_random_automata_in_every_way(data, library):
+def test_random_automata_in_every_way(data, binary):
     draw = lambda low, high: low + (high - low) * data.draw(UNIT)  # noqa: E731
     pairs = {
         "drive": (1.0, 3.0),
@@ -170,7 +160,7 @@ def test_random_automata_in_every_way(data, library):
     visible = [jump.t for jump in arc.jumps if jump.name != "switch"]
     assume(all(b - a > 1e-6 for a, b in itertools.pairwise([*visible, t_end])))
     assume(all(abs(t - step[0]) > 1e-6 for t in visible))
-    loaded = library(Mix(), "mix")
+    loaded = binary(Mix)
     start = {
         element: float(value)
         for variable in automaton.variables
@@ -184,9 +174,9 @@ def test_random_automata_in_every_way(data, library):
 
 
 @pytest.mark.parametrize("seed", [*range(4), *(pytest.param(k, marks=pytest.mark.long) for k in range(4, 40))])
-def test_random_structures_in_every_way(seed, library):
+def test_random_structures_in_every_way(seed, exported):
     automaton = random_automaton(seed)
-    loaded = library(automaton, automaton.name)
+    loaded = Binary(exported(automaton))
     t_end = 2.0
     arc = hm.simulate(automaton, t_end)
     times = [jump.t for jump in arc.jumps if not automaton.jumps[jump.index].internal]
@@ -201,19 +191,19 @@ def test_random_structures_in_every_way(seed, library):
 # Witnesses with known runs: each in every way.
 
 
-def ramps(library, way, points, **start):
-    loaded = library(Ramps(), "ramps")
+def ramps(binary, way, points, **start):
+    loaded = binary(Ramps)
     record = run(loaded, way, points, start=start)
     return record, dict(zip(loaded.outputs, record.samples[-1][1], strict=True))
 
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("third", [1.0 / 3.0, 0.1, 0.7])
-def test_two_guards_at_the_same_mathematical_time_jump_in_order(way, third, library):
+def test_two_guards_at_the_same_mathematical_time_jump_in_order(way, third, binary):
     """a = t and b = 3 t reach `third` and 3 `third` at one time; in floats the crossings differ by rounding."""
     points = communication_points(way, 0.0, 0.75, 4)
     starts = {"rate_a": 1.0, "limit_a": third, "rate_b": 3.0, "limit_b": 3.0 * third}
-    record, end = ramps(library, way, points, **starts)
+    record, end = ramps(binary, way, points, **starts)
     crossings = int(0.75 / third)
     assert end["order"] == float("12" * crossings)
     if way in TIMED:
@@ -227,7 +217,7 @@ def test_two_guards_at_the_same_mathematical_time_jump_in_order(way, third, libr
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_guards_timer_and_communication_point_at_one_time(way, library):
+def test_guards_timer_and_communication_point_at_one_time(way, binary):
     """At 0.5 and at 1.0, which are points, a and b reach their limits and the timer is due; each jumps once.
 
     The flow ends exactly at the timer, and the guards are crossed there or a rounding behind it: in either case all
@@ -235,7 +225,7 @@ def test_guards_timer_and_communication_point_at_one_time(way, library):
     """
     points = communication_points(way, 0.0, 1.25, 5)
     starts = {"rate_a": 2.0, "limit_a": 1.0, "rate_b": 0.3, "limit_b": 0.15, "first": 0.5, "period": 0.5}
-    record, end = ramps(library, way, points, **starts)
+    record, end = ramps(binary, way, points, **starts)
     order = f"{end['order']:.0f}"
     assert {order[:3], order[3:]} == {"132"}
     assert (end["count_a"], end["count_b"], end["rounds"]) == (2, 2, 2)
@@ -247,10 +237,10 @@ def test_guards_timer_and_communication_point_at_one_time(way, library):
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("h", [0.25, 0.1, 1.0 / 3.0])
-def test_event_at_every_communication_point_happens_once(way, h, library):
+def test_event_at_every_communication_point_happens_once(way, h, binary):
     """a reaches h at every k h, the points of the importer."""
     points = [k * h for k in range(7)] + [6.5 * h]
-    record, end = ramps(library, way, points[:: 7 if WAYS[way].get("once") else 1], limit_a=h)
+    record, end = ramps(binary, way, points[:: 7 if WAYS[way].get("once") else 1], limit_a=h)
     assert end["count_a"] == 6
     assert end["a"] == pytest.approx(0.5 * h, abs=EXACT)
     if way in TIMED:
@@ -260,36 +250,36 @@ def test_event_at_every_communication_point_happens_once(way, h, library):
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(("shift", "count"), [(-1e-12, 1), (0.0, 1), (1e-12, 1), (1e-8, 0)])
-def test_guard_crossed_at_the_stop_time(way, shift, count, library):
+def test_guard_crossed_at_the_stop_time(way, shift, count, binary):
     """Up to the tolerance of 1e-9 s behind the stop time it counts, once: rounding does not decide (rule 6)."""
     for t_stop in (0.5, 1.0, 0.7):
         points = communication_points(way, 0.0, t_stop, 3)
-        _, end = ramps(library, way, points, limit_a=t_stop + shift)
+        _, end = ramps(binary, way, points, limit_a=t_stop + shift)
         assert end["count_a"] == count
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_timer_at_the_stop_time_happens(way, library):
+def test_timer_at_the_stop_time_happens(way, binary):
     points = communication_points(way, 0.0, 0.75, 3)
-    _, end = ramps(library, way, points, first=0.25, period=0.25)
+    _, end = ramps(binary, way, points, first=0.25, period=0.25)
     assert end["rounds"] == 3
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_timer_just_behind_the_stop_time_has_its_own_time(way, library):
+def test_timer_just_behind_the_stop_time_has_its_own_time(way, binary):
     """8e-11 s are less than the tolerance of guards: a time event is not moved by it."""
     points = communication_points(way, 0.0, 0.75, 3)
-    _, end = ramps(library, way, points, first=0.25, period=0.25 + 4e-11)
+    _, end = ramps(binary, way, points, first=0.25, period=0.25 + 4e-11)
     assert end["rounds"] == 2
 
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("t_start", [0.0, 5.0, -3.0])
-def test_events_at_the_start_and_a_start_time_that_is_not_zero(way, t_start, library):
+def test_events_at_the_start_and_a_start_time_that_is_not_zero(way, t_start, binary):
     """a and b begin at their limits and the timer is due at the start: all jump there, once, in order."""
     points = communication_points(way, t_start, t_start + 0.9, 3)
     starts = {"a": 0.5, "limit_a": 0.5, "b": 1.0, "limit_b": 1.0, "first": t_start, "period": 0.7}
-    record, end = ramps(library, way, points, **starts)
+    record, end = ramps(binary, way, points, **starts)
     assert end["order"] == 13213.0
     assert end["b"] == pytest.approx(0.9, abs=EXACT)
     if way in TIMED:
@@ -297,19 +287,19 @@ def test_events_at_the_start_and_a_start_time_that_is_not_zero(way, t_start, lib
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_guard_that_falls_is_not_fired(way, library):
+def test_guard_that_falls_is_not_fired(way, binary):
     """From above its limit downwards: enabled at the start only, never by the crossing."""
     points = communication_points(way, 0.0, 2.0, 4)
-    _, end = ramps(library, way, points, a=0.7, rate_a=-1.0, limit_a=0.7, b=0.0, rate_b=-1.0, limit_b=0.5)
+    _, end = ramps(binary, way, points, a=0.7, rate_a=-1.0, limit_a=0.7, b=0.0, rate_b=-1.0, limit_b=0.5)
     assert (end["count_a"], end["count_b"]) == (1, 0)
     assert end["a"] == pytest.approx(-2.0, abs=EXACT)
 
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize(("begin", "end"), [(0.4, 0.6), (0.4, 0.41), (0.7, 0.7 + 1e-4), (3.0 + 1e-3, 3.0 + 2e-3)])
-def test_two_crossings_within_a_step_are_found(way, begin, end, library):
+def test_two_crossings_within_a_step_are_found(way, begin, end, binary):
     points = communication_points(way, 0.0, 4.0, 2)
-    loaded = library(Hill(), "hill")
+    loaded = binary(Hill)
     record = run(loaded, way, points, start={"begin": begin, "end": end})
     last = dict(zip(loaded.outputs, record.samples[-1][1], strict=True))
     assert last["count"] == 1
@@ -318,8 +308,8 @@ def test_two_crossings_within_a_step_are_found(way, begin, end, library):
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("links", [0, 1, 4, 300])
-def test_cascades_are_taken_link_by_link(way, links, library):
-    loaded = library(Cascade(), "cascade")
+def test_cascades_are_taken_link_by_link(way, links, binary):
+    loaded = binary(Cascade)
     points = communication_points(way, 0.0, 2.5, 5)
     record = run(loaded, way, points, start={"links": links, "order": 0.0})
     end = dict(zip(loaded.outputs, record.samples[-1][1], strict=True))
@@ -334,10 +324,9 @@ def test_cascades_are_taken_link_by_link(way, links, library):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_automaton_without_continuous_states(way, library):
+def test_automaton_without_continuous_states(way, binary):
     """Timer, hidden breakpoint at the same times, a guard on the time, and an input that is obeyed at its change."""
-    automaton = Timers()
-    loaded = library(automaton, "timers")
+    automaton, loaded = Timers(), binary(Timers)
     change = (0.8, "command", 3.0)
     points = communication_points(way, 0.0, 1.3, 5, [0.8])
     record = run(loaded, way, points, changes=[change])
@@ -352,27 +341,25 @@ def test_automaton_without_continuous_states(way, library):
         assert flat(record) == [*expected, (1.1, "rings"), (1.25, "ticks")]
 
 
-def test_visible_time_events_are_announced_and_hidden_ones_are_not(library):
-    instance = fmu_driver.Instance(library(Timers(), "timers"))
+def test_visible_time_events_are_announced_and_hidden_ones_are_not(make):
+    instance = make(Timers, "3.0 CS")
     instance.initialize(0.0, 10.0, period=0.5, hidden=0.2)
     _, update = instance.iterate()
     assert update.next_time == 0.5
     instance.do("EnterStepMode")
-    assert instance.step(0.0, 0.5) == fmu_driver.Step(fmu_driver.OK, True, False, False, 0.5)
+    assert instance.step(0.0, 0.5) == Step(OK, True, False, False, 0.5)
     instance.do("EnterEventMode")
     assert instance.ticks() == ("ticks",)
     assert instance.get("saw") == 2  # what the pending jump will give is shown from the beginning of Event Mode
     _, update = instance.iterate()
     assert update.next_time == 1.0
     assert instance.get("mode") == instance.get("saw") == 2
-    instance.free()
 
 
-def test_an_input_set_between_steps_counts_from_then_on(library):
+def test_an_input_set_between_steps_counts_from_then_on(make):
     """Although an event has been announced: that announcement was made for another input."""
     automaton, change = Mix(), (0.1, "push", 1.0)
-    loaded = library(automaton, "mix")
-    instance = fmu_driver.Instance(loaded)
+    instance = make(Mix, "3.0 CS")
     instance.initialize(0.0, 1.0)
     _, update = instance.iterate()
     instance.do("EnterStepMode")
@@ -384,29 +371,27 @@ def test_an_input_set_between_steps_counts_from_then_on(library):
     assert step.early
     assert step.time == pytest.approx(first.t, abs=1e-9)
     assert step.time < update.next_time - 1e-3
-    instance.free()
 
 
-def test_an_input_that_enables_a_jump_between_steps_holds_up_the_next_one(library):
-    instance = fmu_driver.Instance(library(Timers(), "timers"))
+def test_an_input_that_enables_a_jump_between_steps_holds_up_the_next_one(make):
+    instance = make(Timers, "3.0 CS")
     instance.initialize(0.0, 1.0)
     instance.iterate()
     instance.do("EnterStepMode")
     instance.step(0.0, 0.1)
     instance.set("command", 2.0)
-    assert instance.step(0.1, 0.1) == fmu_driver.Step(fmu_driver.OK, True, False, True, 0.1)
+    assert instance.step(0.1, 0.1) == Step(OK, True, False, True, 0.1)
     instance.do("EnterEventMode")
     found, update = instance.iterate()
     assert found == [("obeys",)]
     assert update.next_time == 0.25
-    instance.free()
 
 
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("rate", [1.0, 0.3, -0.3, 7.0])
-def test_flow_priority_jumps_only_where_flow_ends(way, rate, library):
+def test_flow_priority_jumps_only_where_flow_ends(way, rate, binary):
     automaton = FlowFirst(rate=rate)
-    loaded = library(FlowFirst(), "flow_first")
+    loaded = binary(FlowFirst)
     points = communication_points(way, 0.0, 5.2, 8)
     record = run(loaded, way, points, start={"rate": rate})
     compare(automaton, hm.simulate(automaton, 5.2), record, loaded.outputs, way)
@@ -422,12 +407,12 @@ def test_flow_priority_jumps_only_where_flow_ends(way, rate, library):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_bouncing_ball_against_its_closed_form(way, library):
+def test_bouncing_ball_against_its_closed_form(way, binary):
     g, e = 9.81, 0.7
     fall = np.sqrt(2.0 / g)
     impacts = fall * (1.0 + 2.0 * np.cumsum([0.0, *(e**k for k in range(1, 8))]))
     points = communication_points(way, 0.0, 2.4, 16)
-    loaded = library(BouncingBall(h=1.0), "bouncing_ball")
+    loaded = binary(BouncingBall)
     record = run(loaded, way, points)
     if way in TIMED:
         before = impacts[impacts < 2.4]
@@ -440,8 +425,8 @@ def test_bouncing_ball_against_its_closed_form(way, library):
         assert v == pytest.approx(up - g * s, abs=1e-9)
 
 
-def test_thermostat_against_its_closed_form(library):
-    instance = fmu_driver.Instance(library(Thermostat(), "thermostat"))
+def test_thermostat_against_its_closed_form(make):
+    instance = make(Thermostat, "3.0 CS")
     instance.initialize()
     record_times, t = [], 0.0
     _, update = instance.iterate()
@@ -457,4 +442,3 @@ def test_thermostat_against_its_closed_form(library):
     heat, cool = 100.0 * np.log((35.0 - 19.0) / (35.0 - 21.0)), 100.0 * np.log((21.0 - 5.0) / (19.0 - 5.0))
     first = 100.0 * np.log((35.0 - 20.0) / (35.0 - 21.0))
     assert record_times == pytest.approx(first + np.cumsum([0.0, cool, heat, cool, heat, cool]), abs=1e-9)
-    instance.free()

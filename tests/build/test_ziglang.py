@@ -6,7 +6,9 @@ import zipfile
 
 import numpy as np
 import pytest
-from fmu_driver import Instance, Library, advance
+from fmi_driver.binary import Binary
+from fmi_driver.journey import instance
+from fmi_driver.runs import advance
 from witnesses import Mix
 
 from fmu.export import export_fmu
@@ -26,11 +28,11 @@ def test_its_fmu_runs_as_the_usual_one(by_zig, exported):
     """Warnings are errors for it too; its libm may differ in the last bit."""
     records = []
     for path in (exported(Mix(), "mix"), by_zig):
-        for events in (True, False):
-            instance = Instance(Library(path), events=events, early=events)
-            instance.initialize(0.0, 3.0)
-            records.append(advance(instance, [0.25 * k for k in range(13)]))
-            instance.free()
+        for label in ("3.0 CS", "3.0 CS without events"):
+            component = instance(Binary(path), label)
+            component.initialize(0.0, 3.0)
+            records.append(advance(component, [0.25 * k for k in range(13)]))
+            component.free()
     for usual, other in zip(records[:2], records[2:], strict=True):
         assert [clocks for _, clocks in other.ticks] == [clocks for _, clocks in usual.ticks]
         np.testing.assert_allclose([t for t, _ in other.ticks], [t for t, _ in usual.ticks], rtol=0, atol=1e-10)

@@ -7,11 +7,13 @@ import sys
 import threading
 from pathlib import Path
 
-import fmu_driver
 import pytest
 from c_harness import VERSIONS, Instance
 from c_runs import MODES, agree, co_simulation, go_to_mode, has_mode, model_exchange, python_run
 from c_witnesses import WITNESSES
+from fmi_driver.binary import Binary
+from fmi_driver.journey import instance
+from fmi_driver.runs import advance
 
 pytestmark = [
     pytest.mark.faults,
@@ -212,14 +214,14 @@ def test_threads_with_little_stack(name, fmi, started):
 @pytest.mark.parametrize("name", ["ball", "mix"])
 def test_sixteen_threads_of_python(name, exported):
     """ctypes lets other threads run during a call: all of them are in the binary at once."""
-    library = fmu_driver.Library(exported(WITNESSES[name].automaton, f"threads_{name}"))
+    binary = Binary(exported(WITNESSES[name].automaton, f"threads_{name}"))
     points = [0.1 * k for k in range(21)]
 
     def run():
-        instance = fmu_driver.Instance(library)
-        instance.initialize(0.0, points[-1])
-        record = fmu_driver.advance(instance, points)
-        instance.free()
+        component = instance(binary, "3.0 CS")
+        component.initialize(0.0, points[-1])
+        record = advance(component, points)
+        component.free()
         return record
 
     alone, found, start = run(), [], threading.Barrier(16)

@@ -8,17 +8,15 @@ import ctypes as c
 import subprocess
 
 import pytest
-from fmu_driver2 import DISCARD, ERROR, OK, Binary, Component
-from fmu_driver_calls import TABLE
-from fmu_driver_journey import SETTINGS, instance
+from fmi_driver.binary import DISCARD, ERROR, OK, Binary
+from fmi_driver.calls import TABLE
+from fmi_driver.component import Component
+from fmi_driver.journey import SETTINGS
 from witnesses import Cascade, Ramps
 
 from fmu.export import export_fmu
 
-
-@pytest.fixture(scope="module")
-def binaries(exported):
-    return {fmi: Binary(exported(Ramps(), "ramps", fmi)) for fmi in ("2.0", "3.0")}
+LABELS = pytest.mark.parametrize("label", SETTINGS)
 
 
 def modes_of(setting):
@@ -31,34 +29,28 @@ def modes_of(setting):
     return [*modes, "continuous" if setting["kind"] == "me" else "step"]
 
 
-def in_mode(binaries, label, mode):
-    component = instance(binaries, label)
-    if mode == "configuration":
-        component.do("EnterConfigurationMode")
-    elif mode != "instantiated":
-        assert component.enter_initialization() == OK
-        component.set("limit_a", 0.7)
-        if mode != "initialization":
-            component.do("ExitInitializationMode")
-        if mode not in ("initialization", "event") and component.starts_in_event_mode:
-            component.settle()
-        if mode == "terminated":
-            component.do("Terminate")
-    component.saved = component.save()
-    component.saved_bytes = component.serialize(component.saved)
-    return component
+@pytest.fixture
+def in_mode(make):
+    """Lead an instance into a mode; it knows the bytes of its state there."""
 
+    def in_mode(label, mode):
+        component = make(Ramps, label)
+        if mode == "configuration":
+            component.do("EnterConfigurationMode")
+        elif mode != "instantiated":
+            assert component.enter_initialization() == OK
+            component.set("limit_a", 0.7)
+            if mode != "initialization":
+                component.do("ExitInitializationMode")
+            if mode not in ("initialization", "event") and component.starts_in_event_mode:
+                component.settle()
+            if mode == "terminated":
+                component.do("Terminate")
+        component.saved = component.save()
+        component.saved_bytes = component.serialize(component.saved)
+        return component
 
-def state(component):
-    pointer = component.save()
-    found = component.serialize(pointer)
-    component.forget(pointer)
-    return found
-
-
-def close(component):
-    component.forget(component.saved)
-    component.free()
+    return in_mode
 
 
 def rows(setting):
@@ -66,11 +58,11 @@ def rows(setting):
 
 
 @pytest.mark.parametrize(("label", "row"), [(label, row) for label, s in SETTINGS.items() for row in rows(s)])
-def test_calls_are_allowed_in_their_modes_only(label, row, binaries):
+def test_calls_are_allowed_in_their_modes_only(label, row, in_mode):
     setting, case, name = SETTINGS[label], TABLE[row], row.strip()
     allowed = case.cs if setting["kind"] == "cs" else case.me
     for mode in modes_of(setting):
-        component = in_mode(binaries, label, mode)
+        component = in_mode(label, mode)
         # Without events there is no Event Mode to enter, whatever the mode.
         legal = mode in allowed and not (name == "EnterEventMode" and label == "3.0 CS without events")
         found = component.call(name, *case.arguments(component))
@@ -83,19 +75,19 @@ def test_calls_are_allowed_in_their_modes_only(label, row, binaries):
             assert (line.status, line.category) == (ERROR, "logStatusError")
             assert line.text.startswith("block: ")
             assert component.binary.function(name) in line.text
-            assert state(component) == component.saved_bytes
-        close(component)
+            assert ("eventModeUsed" in line.text) == (mode in allowed)
+            assert component.bytes() == component.saved_bytes
+        component.forget(component.saved)
 
 
 @pytest.mark.parametrize(("label", "row"), [(label, row) for label, s in SETTINGS.items() for row in rows(s)])
-def test_null_pointers_are_refused(label, row, binaries):
+def test_null_pointers_are_refused(label, row, in_mode):
     """Each pointer of each function by itself, also the instance, in a mode in which the call is allowed."""
     setting, case, name = SETTINGS[label], TABLE[row], row.strip()
-    binary = binaries[setting["fmi"]]
     allowed = case.cs if setting["kind"] == "cs" else case.me
     mode = next((mode for mode in modes_of(setting) if mode in allowed), "initialization")
-    component = in_mode(binaries, label, mode)
-    arguments = case.arguments(component)
+    component = in_mode(label, mode)
+    arguments, binary = case.arguments(component), component.binary
     function = getattr(binary.functions, binary.function(name))
     assert function(c.c_void_p(None), *arguments) == ERROR
     for k, argument in enumerate(arguments):
@@ -110,18 +102,19 @@ def test_null_pointers_are_refused(label, row, binaries):
         else:
             assert (k, found, len(component.log)) == (k, ERROR, 1)
             assert binary.function(name) in component.log[0].text
-            assert state(component) == component.saved_bytes
+            assert component.bytes() == component.saved_bytes
         component.log.clear()
-    close(component)
+    component.forget(component.saved)
 
 
-def test_the_table_has_every_function(binaries):
+def test_the_table_has_every_function(binary):
     """What the headers declare and the table does not hold is tested by its own tests."""
-    for fmi, binary in binaries.items():
-        listed = subprocess.run(["nm", "-D", "--defined-only", str(binary.path)], capture_output=True, text=True)
+    for fmi in ("2.0", "3.0"):
+        loaded = binary(Ramps, fmi)
+        listed = subprocess.run(["nm", "-D", "--defined-only", str(loaded.library)], capture_output=True, text=True)
         symbols = {line.split()[-1] for line in listed.stdout.splitlines()}
         version = int(fmi[0])
-        tested = {binary.function(row.strip()) for row, case in TABLE.items() if case.version in (0, version)}
+        tested = {loaded.function(row.strip()) for row, case in TABLE.items() if case.version in (0, version)}
         kinds = {s for s in symbols - tested if not s.startswith((f"fmi{version}Get", f"fmi{version}Set"))}
         assert kinds == {f"fmi{version}FreeInstance"} | {s for s in symbols if "Instantiate" in s}
         # The other types' accessors are one piece of code each with those above.
@@ -130,10 +123,11 @@ def test_the_table_has_every_function(binaries):
         assert rest == {f"fmi{version}GetVersion"} | ({"fmi2GetTypesPlatform"} if version == 2 else set())
 
 
-def test_version_2_works_without_callbacks(binaries):
-    functions, boolean = binaries["2.0"].functions, c.c_int(0)
+def test_version_2_works_without_callbacks(binary):
+    loaded, boolean = binary(Ramps, "2.0"), c.c_int(0)
+    functions = loaded.functions
     assert functions.fmi2Instantiate(b"block", 1, b"another", None, None, boolean, boolean) is None
-    handle = functions.fmi2Instantiate(b"block", 1, binaries["2.0"].token, None, None, boolean, boolean)
+    handle = functions.fmi2Instantiate(b"block", 1, loaded.token, None, None, boolean, boolean)
     assert functions.fmi2DoStep(c.c_void_p(handle), c.c_double(0.0), c.c_double(0.1), 1) == ERROR
     assert functions.fmi2EnterInitializationMode(c.c_void_p(handle)) == OK
     assert functions.fmi2ExitInitializationMode(c.c_void_p(handle)) == OK
@@ -153,24 +147,25 @@ def test_a_kind_that_was_not_exported_gives_no_instance(fmi, kind, other, tmp_pa
     assert "this FMU is not for" in component.errors[0]
 
 
-@pytest.mark.parametrize("label", SETTINGS)
-def test_freeing_in_every_mode_and_freeing_nothing(label, binaries):
-    setting = SETTINGS[label]
-    binary = binaries[setting["fmi"]]
-    for mode in modes_of(setting):
-        close(in_mode(binaries, label, mode))
+@LABELS
+def test_freeing_in_every_mode_and_freeing_nothing(label, in_mode):
+    for mode in modes_of(SETTINGS[label]):
+        component = in_mode(label, mode)
+        component.forget(component.saved)
+        component.free()
+    binary = component.binary
     getattr(binary.functions, binary.function("FreeInstance"))(c.c_void_p(None))
 
 
-@pytest.mark.parametrize("label", SETTINGS)
-def test_only_inputs_and_what_an_importer_integrates_are_set_while_running(label, binaries):
+@LABELS
+def test_only_inputs_and_what_an_importer_integrates_are_set_while_running(label, in_mode):
     setting = SETTINGS[label]
     for mode in modes_of(setting):
-        component = in_mode(binaries, label, mode)
+        component = in_mode(label, mode)
         at_start = {"instantiated", "initialization"}
         for name, modes in (("limit_a", at_start), ("a", {*at_start, "continuous"}), ("count_a", at_start)):
             assert (mode, component.try_set(name, 1)) == (mode, OK if mode in modes else ERROR)
         for name in ("time", "der(a)"):
             assert component.try_set(name, 1.0) == ERROR
         assert all(component.binary.function("Set")[:7] in text for text in component.errors)
-        close(component)
+        component.forget(component.saved)

@@ -5,35 +5,29 @@ import math
 
 import numpy as np
 import pytest
-from fmu_driver2 import ERROR, OK, Binary, Component, references
-from fmu_driver_calls import TABLE
-from fmu_driver_journey import SETTINGS, Journey, instance
+from fmi_driver.binary import ERROR, OK, Binary, references
+from fmi_driver.calls import TABLE
+from fmi_driver.component import Component
+from fmi_driver.journey import SETTINGS, Journey
 from witnesses import Cascade, Mix, Ramps
 from witnesses_driven import Tank
 
 import hybrid_model as hm
 from hybrid_model.consensus.weights.automata import GatedSineWeights
 
+PLAIN = "3.0 CS without events"
 NOT_YET_KNOWN, UNCHANGED, CHANGED = range(3)
 USES = pytest.mark.parametrize(
     ("events", "early"), [(True, True), (True, False), (False, True), (False, False)], ids=str
 )
 
 
-@pytest.fixture(scope="module")
-def binaries(exported):
-    models = {"tank": Tank(), "mix": Mix(), "ramps": Ramps(), "cascade": Cascade()}
-    return {n: {fmi: Binary(exported(a, n, fmi)) for fmi in ("2.0", "3.0")} for n, a in models.items()}
-
-
 class Watched:
     """An instance whose intermediate updates are recorded, and answered by `answer(time, may end)` if there is one."""
 
-    def __init__(self, binaries, answer=None, *, events=False, early=False, act=None, name="tank"):
+    def __init__(self, make, answer=None, *, act=None, **options):
         self.answer, self.act, self.calls, self.problem = answer, act, [], None
-        self.component = Component(
-            binaries[name]["3.0"], "cs", events=events, early=early, intermediate=self.update, logging=True
-        )
+        self.component = make(Tank, PLAIN, intermediate=self.update, logging=True, **options)
 
     def update(self, environment, time, set_requested, get_allowed, finished, may_end, asked, end):
         try:
@@ -52,7 +46,7 @@ def level(t, inflow=0.5, drain=0.1):
 
 
 @USES
-def test_the_importer_sees_the_state_on_the_way(events, early, binaries):
+def test_the_importer_sees_the_state_on_the_way(events, early, make):
     def look(component, time):
         assert component.get("time") == time
         # The tank's level in closed form; the FMU promises 1e-8.
@@ -61,7 +55,7 @@ def test_the_importer_sees_the_state_on_the_way(events, early, binaries):
         status, [slope] = component.rates(["level"])
         assert (status, slope) == (OK, pytest.approx(0.5 - 0.1 * level(time), abs=1e-8))
 
-    watched = Watched(binaries, events=events, early=early, act=look)
+    watched = Watched(make, events=events, early=early, act=look)
     watched.component.begin()
     for k in range(4):
         found = watched.component.step(k * 0.4, 0.4)
@@ -72,24 +66,22 @@ def test_the_importer_sees_the_state_on_the_way(events, early, binaries):
     assert times == sorted(set(times))
     assert {call[1:] for call in watched.calls} == {(True, True, True, early)}
     assert watched.component.log == []
-    watched.component.free()
 
 
 @USES
-def test_being_watched_changes_nothing_but_roundings(events, early, binaries):
+def test_being_watched_changes_nothing_but_roundings(events, early, make):
     runs = []
     for watch in (True, False):
-        component = Watched(binaries, events=events, early=early).component if watch else Component(
-            binaries["tank"]["3.0"], "cs", events=events, early=early, logging=True)  # fmt: skip
+        options = {"events": events, "early": early}
+        component = Watched(make, **options).component if watch else make(Tank, PLAIN, logging=True, **options)
         journey = Journey(component)
         runs.append([journey.go_to(t)[2]["level"] for t in (0.7, 1.9, 2.6, 5.0)] + [t for _, t in component.jumps])
-        component.free()
     assert len(runs[0]) == 6
     np.testing.assert_allclose(runs[0], runs[1], rtol=0, atol=1e-10)
 
 
 @USES
-def test_inputs_set_on_the_way_act_from_there(events, early, binaries):
+def test_inputs_set_on_the_way_act_from_there(events, early, make):
     """The inflow is stopped at the first call at or after 0.5: what is in the tank then drains away."""
     stopped = []
 
@@ -98,17 +90,16 @@ def test_inputs_set_on_the_way_act_from_there(events, early, binaries):
             stopped.append(time)
             component.set("inflow", 0.0)
 
-    watched = Watched(binaries, events=events, early=early, act=stop)
+    watched = Watched(make, events=events, early=early, act=stop)
     watched.component.begin()
     assert watched.component.step(0.0, 1.5).status == OK
     assert watched.problem is None
     [moment] = stopped
     expected = level(moment) * math.exp(-0.1 * (1.5 - moment))
     assert watched.component.get("level") == pytest.approx(expected, abs=1e-8)
-    watched.component.free()
 
 
-def test_discrete_inputs_parameters_and_the_step_itself_are_not_for_updates(binaries):
+def test_discrete_inputs_parameters_and_the_step_itself_are_not_for_updates(make):
     forbidden = [row for row in TABLE if TABLE[row].version in (0, 3)
                  and not row.startswith(("Get", "Set", "Ser", "Des", "Free"))]  # fmt: skip
     statuses = {}
@@ -128,7 +119,7 @@ def test_discrete_inputs_parameters_and_the_step_itself_are_not_for_updates(bina
                 statuses[row] = component.call(row.strip(), *arguments)
         component.binary.functions.fmi3FreeInstance(c.c_void_p(component.handle))
 
-    watched, plain = Watched(binaries, act=meddle), Watched(binaries)
+    watched, plain = Watched(make, act=meddle), Watched(make)
     for each in (watched, plain):
         each.component.begin()
         assert each.component.step(0.0, 1.5).status == OK
@@ -138,13 +129,11 @@ def test_discrete_inputs_parameters_and_the_step_itself_are_not_for_updates(bina
     assert len(watched.component.errors) == len(statuses) + 1
     assert "fmi3FreeInstance" in watched.component.errors[-1]
     assert watched.component.values() == plain.component.values()
-    watched.component.free()
-    plain.component.free()
 
 
 @pytest.mark.parametrize("delay", [0.0, 1e-9, 0.013, 10.0, -1.0, math.nan, math.inf])
 @pytest.mark.parametrize("events", [True, False])
-def test_early_return_where_the_importer_asks_for_it(events, delay, binaries):
+def test_early_return_where_the_importer_asks_for_it(events, delay, make):
     asked = []
 
     def answer(time, may_end):
@@ -154,7 +143,7 @@ def test_early_return_where_the_importer_asks_for_it(events, delay, binaries):
             return time + delay
         return None
 
-    watched = Watched(binaries, answer, events=events, early=True)
+    watched = Watched(make, answer, events=events, early=True)
     watched.component.begin()
     found = watched.component.step(0.0, 1.2)
     assert watched.problem is None
@@ -173,12 +162,11 @@ def test_early_return_where_the_importer_asks_for_it(events, delay, binaries):
     watched.answer = None
     assert watched.component.step(found.time, 1.5 - found.time).status == OK
     assert watched.component.get("level") == pytest.approx(level(1.5), abs=1e-8)
-    watched.component.free()
 
 
 @pytest.mark.parametrize("events", [True, False])
-def test_an_importer_that_always_asks_still_gets_on(events, binaries):
-    watched = Watched(binaries, lambda time, may_end: time, events=events, early=True)
+def test_an_importer_that_always_asks_still_gets_on(events, make):
+    watched = Watched(make, lambda time, may_end: time, events=events, early=True)
     watched.component.begin()
     t, n = 0.0, 0
     while t < 1.0:
@@ -188,55 +176,49 @@ def test_an_importer_that_always_asks_still_gets_on(events, binaries):
         assert n < 2000
     assert n > 10
     assert watched.component.get("level") == pytest.approx(level(1.0), abs=1e-8)
-    watched.component.free()
 
 
-def test_without_leave_to_return_early_a_wish_is_not_followed(binaries):
-    watched = Watched(binaries, lambda time, may_end: time, early=False)
+def test_without_leave_to_return_early_a_wish_is_not_followed(make):
+    watched = Watched(make, lambda time, may_end: time, early=False)
     watched.component.begin()
     assert watched.component.step(0.0, 1.0)[:4] == (OK, False, False, False)
     assert watched.component.get("time") == 1.0
-    watched.component.free()
 
 
-def test_intermediate_variables_that_are_none_are_refused(binaries):
-    binary = binaries["tank"]["3.0"]
-    component = Component(binary, "cs", required=[binary.reference("level"), len(binary.variables)])
+def test_intermediate_variables_that_are_none_are_refused(make, binary):
+    loaded = binary(Tank)
+    component = make(Tank, PLAIN, required=[loaded.reference("level"), len(loaded.variables)])
     assert component.handle is None
-    assert str(len(binary.variables)) in component.errors[0]
-    handle = binary.functions.fmi3InstantiateCoSimulation(
-        b"block", binary.token, None, *[c.c_bool(False)] * 4, None, c.c_size_t(1), None, component.listen, None
+    assert str(len(loaded.variables)) in component.errors[0]
+    handle = loaded.functions.fmi3InstantiateCoSimulation(
+        b"block", loaded.token, None, *[c.c_bool(False)] * 4, None, c.c_size_t(1), None, component.listen, None
     )
     assert handle is None
     assert len(component.errors) == 2
-    component = Component(binary, "cs", required=[binary.reference("level"), binary.reference("inflow")])
-    component.begin()
-    component.free()
+    make(Tank, PLAIN, required=[loaded.reference("level"), loaded.reference("inflow")]).begin()
 
 
 # The log.
 
 
 @pytest.mark.parametrize("label", SETTINGS)
-@pytest.mark.parametrize("name", ["mix", "cascade"])
-def test_the_log_of_events_is_the_list_of_jumps(label, name, binaries):
-    automaton = {"mix": Mix, "cascade": Cascade}[name]()
-    component = instance(binaries[name], label, logging=True)
+@pytest.mark.parametrize("automaton", [Mix, Cascade])
+def test_the_log_of_events_is_the_list_of_jumps(label, automaton, make):
+    component = make(automaton, label, logging=True)
     journey = Journey(component)
     for t in (0.3, 0.61, 1.05, 2.2):
         journey.go_to(t)
-    expected = [jump for jump in hm.simulate(automaton, 2.2).jumps if jump.name != "switch"]
+    expected = [jump for jump in hm.simulate(automaton(), 2.2).jumps if jump.name != "switch"]
     assert [jump for jump, _ in component.jumps] == [jump.name for jump in expected]
     np.testing.assert_allclose([t for _, t in component.jumps], [jump.t for jump in expected], rtol=0, atol=1e-7)
     assert len(expected) > 5
     assert {line.status for line in component.log} == {OK}
-    component.free()
 
 
 @pytest.mark.parametrize("label", SETTINGS)
-def test_categories(label, binaries):
+def test_categories(label, make):
     """Errors are told in any case; events only while logging is on, and among the categories asked for."""
-    component = instance(binaries["ramps"], label)
+    component = make(Ramps, label)
     journey = Journey(component, limit_a=0.25)
 
     def choose(on, *categories):
@@ -258,35 +240,33 @@ def test_categories(label, binaries):
     assert "'%s%n'" in component.errors[-1]
     array = (c.c_char_p * 1)(None)
     assert component.call("SetDebugLogging", component.binary.boolean(True), c.c_size_t(1), array) == ERROR
-    component.free()
 
 
 @pytest.mark.parametrize("label", SETTINGS)
-def test_without_a_logger_all_is_quiet(label, binaries):
+def test_without_a_logger_all_is_quiet(label, make):
     for logging in (True, False):
-        component = instance(binaries["ramps"], label, logger=False, logging=logging)
+        component = make(Ramps, label, logger=False, logging=logging)
         journey = Journey(component, limit_a=0.25)
         journey.go_to(0.6)
         assert component.call("ExitInitializationMode") == ERROR
         assert component.try_set("limit_a", 1.0) == ERROR
+        assert component.try_set("a", math.nan) == ERROR
         assert component.access("Get", component.binary.float_type, [2**32 - 1], [1.0]) == (ERROR, [1.0])
         component.do("SetDebugLogging", component.binary.boolean(True), c.c_size_t(0), None)
         journey.go_to(1.1)
         assert component.log == []
-        component.free()
 
 
 @pytest.mark.parametrize("label", SETTINGS)
-def test_strings_are_copied(label, binaries):
+def test_strings_are_copied(label, make, binary):
     """The importer may free name and token as soon as the instance is there; markers in names stay what they are."""
     name = c.create_string_buffer(b"first %s%n")
-    token = c.create_string_buffer(binaries["ramps"][SETTINGS[label]["fmi"]].token)
-    component = instance(binaries["ramps"], label, name=name, token=token)
+    token = c.create_string_buffer(binary(Ramps, SETTINGS[label]["fmi"]).token)
+    component = make(Ramps, label, name=name, token=token)
     c.memset(name, ord("x"), len(name))
     c.memset(token, ord("x"), len(token))
     assert component.call("ExitInitializationMode") == ERROR
     assert component.errors[0].startswith("first %s%n: fmi")
-    component.free()
 
 
 @pytest.mark.parametrize("label", SETTINGS)
@@ -296,8 +276,8 @@ def test_strings_are_copied(label, binaries):
     [({"token": b"another"}, "another"), ({"token": b""}, "token"), ({"token": b"%s%n%s%n"}, "%s%n%s%n"),
      ({"name": b""}, "name"), ({"name": b" \t\n"}, "name"), ({"name": None}, "name"), ({"token": b"x" * 5000}, "xxx")],
 )  # fmt: skip
-def test_a_wrong_name_or_token_gives_no_instance(label, logger, options, word, binaries):
-    component = instance(binaries["ramps"], label, logger=logger, **options)
+def test_a_wrong_name_or_token_gives_no_instance(label, logger, options, word, make):
+    component = make(Ramps, label, logger=logger, **options)
     assert component.handle is None
     assert len(component.errors) == logger
     assert all(word in text for text in component.errors)
@@ -315,8 +295,8 @@ def interval(component):
 
 
 @pytest.mark.parametrize("label", ["3.0 CS", "3.0 CS, events inside", "3.0 ME"])
-def test_the_countdown_clock_tells_how_long_it_is_to_the_next_event(label, binaries):
-    component = instance(binaries["ramps"], label)
+def test_the_countdown_clock_tells_how_long_it_is_to_the_next_event(label, make):
+    component = make(Ramps, label)
     assert component.enter_initialization(1.0) == OK
     component.set("first", 1.5)
     component.set("period", 0.25)
@@ -352,7 +332,6 @@ def test_the_countdown_clock_tells_how_long_it_is_to_the_next_event(label, binar
         assert component.ticks() == ("ticks_timer",)
     assert component.get("rounds") == 4  # the view of Event Mode: with the event that is due
     assert len(component.log) == 4  # the refusals outside Event Mode
-    component.free()
 
 
 class Filling(hm.HybridAutomaton):
@@ -378,9 +357,9 @@ def settled(component):
     return interval(component)
 
 
-def test_an_interval_that_was_told_stays_known_until_the_clock_ticks(exported):
+def test_an_interval_that_was_told_stays_known_until_the_clock_ticks(make):
     """FMI 3.0.2, fmi3GetInterval: not yet known is for clocks of which no interval was told since they ticked."""
-    component = instance({"3.0": Binary(exported(Filling(), "filling"))}, "3.0 CS")
+    component = make(Filling, "3.0 CS")
     assert component.enter_initialization(0.0) == OK
     component.do("ExitInitializationMode")
     assert settled(component)[::2] == (OK, NOT_YET_KNOWN)
@@ -399,11 +378,10 @@ def test_an_interval_that_was_told_stays_known_until_the_clock_ticks(exported):
     clock = references([component.binary.reference("next_event")])
     component.do("SetClock", clock, c.c_size_t(1), (c.c_bool * 1)(True))
     assert settled(component)[::2] == (OK, NOT_YET_KNOWN)
-    component.free()
 
 
-def test_a_tick_too_early_does_nothing(binaries):
-    component = instance(binaries["ramps"], "3.0 CS")
+def test_a_tick_too_early_does_nothing(make):
+    component = make(Ramps, "3.0 CS")
     component.begin(limit_a=0.5)
     component.step(0.0, 0.25)
     component.do("EnterEventMode")
@@ -414,11 +392,10 @@ def test_a_tick_too_early_does_nothing(binaries):
     assert (update.again, update.next_time) == (False, pytest.approx(0.5, abs=1e-12))
     assert interval(component) == (OK, pytest.approx(0.25, abs=1e-12), CHANGED)
     assert component.get("count_a") == 0
-    component.free()
 
 
-def test_clocks_that_are_none_or_outputs_are_refused(binaries):
-    component = instance(binaries["ramps"], "3.0 CS")
+def test_clocks_that_are_none_or_outputs_are_refused(make):
+    component = make(Ramps, "3.0 CS")
     component.initialize()
     for name in ("a", "ticks_a"):
         reference, array = references([component.binary.reference(name)]), (c.c_bool * 1)(True)
@@ -430,7 +407,6 @@ def test_clocks_that_are_none_or_outputs_are_refused(binaries):
     values, qualifiers = (c.c_double * 2)(7.0, 7.0), (c.c_int * 2)(7, 7)
     assert component.call("GetIntervalDecimal", both, c.c_size_t(2), values, qualifiers) == ERROR
     assert (list(values), list(qualifiers)) == ([7.0, 7.0], [7, 7]), "a part was written"
-    component.free()
 
 
 # Structural parameters.

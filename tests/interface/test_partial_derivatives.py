@@ -6,8 +6,8 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from fmu_driver2 import DISCARD, ERROR, OK, Binary, doubles
-from fmu_driver_journey import SETTINGS, Journey, instance
+from fmi_driver.binary import DISCARD, ERROR, OK, doubles
+from fmi_driver.journey import SETTINGS, Journey
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from witnesses_ends import Pole
@@ -84,11 +84,6 @@ def jacobians():
 JACOBIANS = jacobians()
 
 
-@pytest.fixture(scope="module")
-def binaries(exported):
-    return {fmi: Binary(exported(AUTOMATON, "curved", fmi)) for fmi in ("2.0", "3.0")}
-
-
 def element_key(name):
     """The element of an array of derivatives as an element's derivative: der(x)[2] -> der(x[2])."""
     head, bracket, index = name.partition(")[")
@@ -104,10 +99,10 @@ def variables_for(binary, keys):
     return {name: members for name, members in wholes.items() if set(members) <= set(keys)}
 
 
-def prepared(binaries, label, mode, seed=0):
+def prepared(make, label, mode, seed=0):
     """An instance in a mode with random values; initialization and running, and the point that it is at."""
     rng = np.random.default_rng(seed)
-    component = instance(binaries, label)
+    component = make(Curved, label)
     assert component.enter_initialization(0.3) == OK
     starts = {name: rng.uniform(0.2, 1.0) for name in [*INPUTS, *PARAMETERS, *STATES, *DISCRETES]
               if name not in ("w", "e", "n")}  # fmt: skip
@@ -138,9 +133,9 @@ def jacobian(component, mode):
 @pytest.mark.parametrize("mode", MODES)
 @settings(max_examples=15, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
-def test_random_directions(label, mode, data, binaries):
+def test_random_directions(label, mode, data, make):
     """Some unknowns, some knowns, a seed: the products with CasADi's Jacobian, and one transposes the other."""
-    component = prepared(binaries, label, mode, data.draw(st.integers(0, 5)))
+    component = prepared(make, label, mode, data.draw(st.integers(0, 5)))
     rows, columns = (variables_for(component.binary, keys) for keys in (ROWS, COLUMNS))
     unknowns = data.draw(st.lists(st.sampled_from(sorted(rows)), max_size=5))
     knowns = data.draw(st.lists(st.sampled_from(sorted(columns)), max_size=5))
@@ -161,12 +156,11 @@ def test_random_directions(label, mode, data, binaries):
         np.testing.assert_allclose(reverse, j.T @ np.array(weights), rtol=1e-12, atol=1e-12)
         assert np.dot(forward, weights) == pytest.approx(np.dot(seed, reverse), rel=1e-11, abs=1e-11)
     assert component.log == []
-    component.free()
 
 
 @pytest.mark.parametrize("label", ["2.0 CS", "3.0 ME"])
-def test_differences_of_what_the_fmu_shows_in_initialisation(label, binaries):
-    component = prepared(binaries, label, "initialization", 3)
+def test_differences_of_what_the_fmu_shows_in_initialisation(label, make):
+    component = prepared(make, label, "initialization", 3)
     settable = [n for n in [*INPUTS, *PARAMETERS, *STATES, *DISCRETES] if n not in ("w", "e", "n")]
     shown = {element_key(name): name for name in component.binary.elements}
     h = 1e-6
@@ -180,12 +174,11 @@ def test_differences_of_what_the_fmu_shows_in_initialisation(label, binaries):
         # Central differences: rounding 1e-16/h and h^2 times a third derivative of some ten.
         expected = (np.array(sides[1]) - sides[0]) / (2 * h)
         np.testing.assert_allclose(j[:, COLUMNS.index(known)], expected, rtol=0, atol=2e-9)
-    component.free()
 
 
 @pytest.mark.parametrize("label", ["2.0 ME", "3.0 ME"])
-def test_differences_of_what_the_fmu_shows_while_running(label, binaries):
-    component = prepared(binaries, label, "running", 4)
+def test_differences_of_what_the_fmu_shows_while_running(label, make):
+    component = prepared(make, label, "running", 4)
     n, h = len(STATES), 1e-6
     x = np.array(component.vector("GetContinuousStates", n)[1])
     unknowns = sorted(variables_for(component.binary, ROWS[:n]))
@@ -204,13 +197,12 @@ def test_differences_of_what_the_fmu_shows_while_running(label, binaries):
         order = [key for unknown in unknowns for key in variables_for(component.binary, ROWS[:n])[unknown]]
         expected = dict(zip(ROWS[:n], (np.array(sides[1]) - sides[0]) / (2 * h), strict=True))
         np.testing.assert_allclose(found, [expected[key] for key in order], rtol=0, atol=2e-9)
-    component.free()
 
 
 @pytest.mark.parametrize("label", SETTINGS)
 @pytest.mark.parametrize("mode", MODES)
-def test_what_is_no_unknown_or_no_known_is_refused(label, mode, binaries):
-    component = prepared(binaries, label, mode)
+def test_what_is_no_unknown_or_no_known_is_refused(label, mode, make):
+    component = prepared(make, label, mode)
     functions = [FORWARD] if component.binary.version == 2 else [FORWARD, REVERSE]
     rate = sorted(variables_for(component.binary, ROWS[: len(STATES)]))[-1]
     wrong = [
@@ -238,32 +230,28 @@ def test_what_is_no_unknown_or_no_known_is_refused(label, mode, binaries):
             status, result = component.derivative(function, ["y"], ["u"], [1.0, 1.0])
             assert (status, result) == (ERROR, [math.pi])
             assert "2 values" in component.errors[-1]
-    component.free()
 
 
 @pytest.mark.parametrize("label", ["2.0 CS", "3.0 CS"])
-def test_asking_for_derivatives_changes_nothing(label, binaries):
-    one, other = (Journey(instance(binaries, label)) for _ in range(2))
+def test_asking_for_derivatives_changes_nothing(label, make):
+    one, other = (Journey(make(Curved, label)) for _ in range(2))
     for t in (0.1, 0.35, 0.6):
         assert one.go_to(t) == other.go_to(t)
         for function in [FORWARD] if one.component.binary.version == 2 else [FORWARD, REVERSE]:
             assert one.component.derivative(function, ["y"], ["u"], [1.0])[0] == OK
         before, after = one.component.save(), other.component.save()
         assert one.component.serialize(before) == other.component.serialize(after)
-    one.component.free()
-    other.component.free()
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
-def test_an_infinite_derivative_is_not_given(fmi, exported):
-    component = instance({fmi: Binary(exported(Pole(), "pole", fmi))}, f"{fmi} ME")
+def test_an_infinite_derivative_is_not_given(fmi, make):
+    component = make(Pole, f"{fmi} ME")
     component.begin()
     component.do("SetContinuousStates", doubles([1.0]), c.c_size_t(1))
     assert component.derivative(FORWARD, ["y"], ["x"], [1.0]) == (DISCARD, [math.pi])
     assert "not finite" in component.errors[0]
     component.do("SetContinuousStates", doubles([0.75]), c.c_size_t(1))
     assert component.derivative(FORWARD, ["y", "der(x)"], ["x"], [1.0]) == (OK, [-1.0, 16.0])
-    component.free()
 
 
 class Clipped(hm.HybridAutomaton):
@@ -282,8 +270,8 @@ class Clipped(hm.HybridAutomaton):
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 @pytest.mark.parametrize(("h", "slopes"), [(-0.25, (0.0, 2.0)), (-1e-9, (0.0, 2.0)), (0.25, (-3.0, 3.0))])
-def test_a_root_of_what_is_cut_off_has_its_derivatives(fmi, h, slopes, exported):
-    component = instance({fmi: Binary(exported(Clipped(), "clipped", fmi))}, f"{fmi} ME")
+def test_a_root_of_what_is_cut_off_has_its_derivatives(fmi, h, slopes, make):
+    component = make(Clipped, f"{fmi} ME")
     Journey(component, h=h)
     for unknown, slope in zip(("der(h)", "y"), slopes, strict=True):
         # A difference quotient over a millionth of h; the root is straight there up to 1e-6.
@@ -295,7 +283,7 @@ def test_a_root_of_what_is_cut_off_has_its_derivatives(fmi, h, slopes, exported)
 
 
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
-def test_where_the_two_sides_have_different_slopes_there_is_no_derivative(fmi, exported):
-    component = instance({fmi: Binary(exported(Clipped(), "clipped", fmi))}, f"{fmi} ME")
+def test_where_the_two_sides_have_different_slopes_there_is_no_derivative(fmi, make):
+    component = make(Clipped, f"{fmi} ME")
     Journey(component, h=0.0)
     assert component.derivative(FORWARD, ["der(h)"], ["h"], [1.0])[0] == DISCARD

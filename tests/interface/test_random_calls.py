@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import hypothesis
 import pytest
-from fmu_driver2 import DISCARD, ERROR, OK, Binary, Component, Update, doubles, references
-from fmu_driver_calls import TABLE
-from fmu_driver_exchange import Exchange
-from fmu_driver_journey import SETTINGS
+from fmi_driver.binary import DISCARD, ERROR, OK, doubles, references
+from fmi_driver.calls import TABLE
+from fmi_driver.component import Component, Update
+from fmi_driver.exchange import Exchange
+from fmi_driver.journey import SETTINGS
 from hypothesis import strategies as st
 from hypothesis.stateful import (
     RuleBasedStateMachine,
@@ -83,12 +84,12 @@ class Calls(RuleBasedStateMachine):
     """Rules for an instance of one setting."""
 
     label = ""
-    binaries = None
+    load = None
 
     def __init__(self):
         super().__init__()
         self.setting = LABELS[self.label]
-        self.binary = self.binaries[self.setting["fmi"]]
+        self.binary = self.load(Mix, self.setting["fmi"])
         self.steps_before_return = math.inf
         self.saved = []  # (pointer, bytes, place)
         self.samples = []
@@ -126,12 +127,6 @@ class Calls(RuleBasedStateMachine):
     def moving(self):
         """The mode in which time passes."""
         return "continuous" if self.setting["kind"] == "me" else "step"
-
-    def bytes_now(self):
-        pointer = self.component.save()
-        data = self.component.serialize(pointer)
-        self.component.forget(pointer)
-        return data
 
     def allowed(self, row):
         case = TABLE[row]
@@ -201,7 +196,7 @@ class Calls(RuleBasedStateMachine):
     def reset(self):
         self.component.do("Reset")
         self.forget_everything()
-        assert self.bytes_now() == self.component.saved_bytes, "reset is not as new"
+        assert self.component.bytes() == self.component.saved_bytes, "reset is not as new"
 
     @precondition(lambda self: self.mode in ("event", "step", "continuous"))
     @rule(now=SELDOM)
@@ -317,7 +312,7 @@ class Calls(RuleBasedStateMachine):
         self.refuse(data.draw(st.sampled_from([row for row in self.rows() if not self.allowed(row)])))
 
     def refuse(self, row):
-        before = self.bytes_now()
+        before = self.component.bytes()
         self.component.log.clear()
         assert self.component.call(row.strip(), *TABLE[row].arguments(self.component)) == ERROR
         self.check_refusal(row.strip(), before)
@@ -326,18 +321,18 @@ class Calls(RuleBasedStateMachine):
         [line] = self.component.log
         assert (line.status, line.category) == (ERROR, "logStatusError")
         assert self.binary.function(name) in line.text
-        assert self.bytes_now() == before
+        assert self.component.bytes() == before
         self.component.log.clear()
 
     @rule(data=st.data())
     def reading(self, data):
         rows = [row for row in READING if row in self.rows() and self.allowed(row)]
         row = data.draw(st.sampled_from(rows))
-        before = self.bytes_now()
+        before = self.component.bytes()
         found = self.component.call(row, *TABLE[row].arguments(self.component))
         assert found == TABLE[row].status
         self.component.values()
-        assert self.bytes_now() == before
+        assert self.component.bytes() == before
         self.component.log.clear()
 
     @rule(
@@ -358,7 +353,7 @@ class Calls(RuleBasedStateMachine):
             value = None
         array = None if value is None else doubles([value] * 2)
         more = () if self.binary.version == 2 else (c.c_size_t(room),)
-        before = self.bytes_now()
+        before = self.component.bytes()
         self.component.log.clear()
         function = f"{function}Float64"
         status = self.component.call(function, references([number]), c.c_size_t(1), array, *more)
@@ -373,7 +368,7 @@ class Calls(RuleBasedStateMachine):
     def bad_step(self, gap, h):
         if (gap, h) == (0.0, 0.1):
             return
-        before = self.bytes_now()
+        before = self.component.bytes()
         self.component.log.clear()
         assert self.component.step(self.t + gap, h).status == ERROR
         self.check_refusal("DoStep", before)
@@ -381,7 +376,7 @@ class Calls(RuleBasedStateMachine):
     @precondition(lambda self: self.mode == "continuous")
     @rule(value=st.sampled_from([math.nan, math.inf, -math.inf]), n=st.sampled_from([0, 1, 3, 2**40]))
     def bad_states(self, value, n):
-        before = self.bytes_now()
+        before = self.component.bytes()
         for function, arguments in (
             ("SetTime", (c.c_double(value),)),
             ("SetContinuousStates", (doubles([0.1, value]), c.c_size_t(2))),
@@ -412,7 +407,7 @@ class Calls(RuleBasedStateMachine):
         self.component.load(pointer)
         self.component.forget(pointer)
         self.component.log.clear()
-        assert self.bytes_now() == before
+        assert self.component.bytes() == before
 
     # Saved states.
 
@@ -432,7 +427,7 @@ class Calls(RuleBasedStateMachine):
         assert self.component.serialize(pointer) == content, "a saved state has changed"
         self.component.load(pointer)
         self.go_to(place)
-        assert self.bytes_now() == content
+        assert self.component.bytes() == content
 
     @precondition(lambda self: self.saved)
     @rule(data=st.data())
@@ -446,7 +441,7 @@ class Calls(RuleBasedStateMachine):
     @rule()
     def move(self):
         """To a new instance, by bytes; so go the saved states."""
-        now = self.bytes_now()
+        now = self.component.bytes()
         old, place = self.component, self.place()
         contents = [(content, place) for _, content, place in self.saved]
         for pointer, _, _ in self.saved:
@@ -464,11 +459,11 @@ class Calls(RuleBasedStateMachine):
         self.component.load(pointer)
         self.component.forget(pointer)
         self.go_to(place)
-        assert self.bytes_now() == now
+        assert self.component.bytes() == now
 
     @rule(at=st.integers(0), bit=st.integers(0, 7), cut=st.integers(1, 4000))
     def damaged(self, at, bit, cut):
-        before = self.bytes_now()
+        before = self.component.bytes()
         flipped = bytearray(before)
         flipped[at % len(flipped)] ^= 1 << bit
         for data in (bytes(flipped), before[: max(0, len(before) - cut)], before + b"\0" * cut):
@@ -504,13 +499,8 @@ class Calls(RuleBasedStateMachine):
         self.component.free()
 
 
-@pytest.fixture(scope="module")
-def binaries(exported):
-    return {fmi: Binary(exported(Mix(), "mix", fmi)) for fmi in ("2.0", "3.0")}
-
-
-def run(label, binaries, examples, steps, **options):
-    machine = type("Machine", (Calls,), {"label": label, "binaries": binaries})
+def run(label, binary, examples, steps, **options):
+    machine = type("Machine", (Calls,), {"label": label, "load": staticmethod(binary)})
     run_state_machine_as_test(
         machine,
         settings=hypothesis.settings(
@@ -524,11 +514,11 @@ def run(label, binaries, examples, steps, **options):
 
 
 @pytest.mark.parametrize("label", LABELS)
-def test_random_calls(label, binaries):
-    run(label, binaries, 16, 25)
+def test_random_calls(label, binary):
+    run(label, binary, 16, 25)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("label", LABELS)
-def test_many_random_calls(label, binaries):
-    run(label, binaries, 200, 40)
+def test_many_random_calls(label, binary):
+    run(label, binary, 200, 40)

@@ -9,8 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from fmu_driver2 import ERROR, OK, Binary
-from fmu_driver_journey import SETTINGS, Journey, instance
+from fmi_driver.binary import ERROR, OK
+from fmi_driver.journey import SETTINGS, Journey
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from witnesses import Mix, Ramps
@@ -22,39 +22,18 @@ STARTS = {"limit_a": 0.3, "rate_b": 2.0, "limit_b": 1.1, "first": 0.45, "period"
 LABELS = pytest.mark.parametrize("label", SETTINGS)
 
 
-@pytest.fixture(scope="module")
-def paths(exported):
-    return {
-        (name, fmi): exported(automaton, name, fmi)
-        for name, automaton in (("mix", Mix()), ("ramps", Ramps()))
-        for fmi in ("2.0", "3.0")
-    }
-
-
-@pytest.fixture(scope="module")
-def binaries(paths):
-    return {name: {fmi: Binary(paths[name, fmi]) for fmi in ("2.0", "3.0")} for name in ("mix", "ramps")}
-
-
-def on_the_way(binaries, label, t=0.4):
-    journey = Journey(instance(binaries["mix"], label), 0.0, 2.0, push=0.1)
+def on_the_way(make, label, t=0.4):
+    journey = Journey(make(Mix, label), 0.0, 2.0, push=0.1)
     journey.go_to(t)
     return journey
 
 
-def state_bytes(component):
-    pointer = component.save()
-    data = component.serialize(pointer)
-    component.forget(pointer)
-    return data
-
-
 @LABELS
-def test_another_instance_continues_bit_for_bit(label, binaries):
-    journey = on_the_way(binaries, label)
-    data, place = state_bytes(journey.component), journey.place()
+def test_another_instance_continues_bit_for_bit(label, make):
+    journey = on_the_way(make, label)
+    data, place = journey.component.bytes(), journey.place()
     expected = [journey.go_to(t) for t in POINTS]
-    other = on_the_way(binaries, label, t=0.9)
+    other = on_the_way(make, label, t=0.9)
     status, pointer = other.component.deserialize(data)
     assert status == OK
     assert other.component.serialize(pointer) == data
@@ -62,20 +41,18 @@ def test_another_instance_continues_bit_for_bit(label, binaries):
     other.component.forget(pointer)
     other.go_to_place(place)
     assert [other.go_to(t) for t in POINTS] == expected
-    assert state_bytes(other.component) == state_bytes(journey.component)
+    assert other.component.bytes() == journey.component.bytes()
     assert other.component.log == journey.component.log == []
-    other.component.free()
-    journey.component.free()
 
 
 CHILD = f"""
 import hashlib, sys
 from pathlib import Path
 sys.path.insert(0, {SUPPORT!r})
-from fmu_driver2 import OK, Binary
-from fmu_driver_journey import Journey, instance
-path, label, fmi, task, file = sys.argv[1:]
-journey = Journey(instance({{fmi: Binary(Path(path))}}, label), 0.0, 2.0, push=0.1)
+from fmi_driver.binary import OK, Binary
+from fmi_driver.journey import Journey, instance
+path, label, task, file = sys.argv[1:]
+journey = Journey(instance(Binary(path), label), 0.0, 2.0, push=0.1)
 component = journey.component
 if task == "write":
     journey.go_to(0.4)
@@ -97,7 +74,7 @@ print(hashlib.sha256(component.serialize(component.save())).hexdigest())
 
 
 def child(path, label, task, file, seed):
-    command = [sys.executable, "-c", CHILD, str(path), label, SETTINGS[label]["fmi"], task, str(file)]
+    command = [sys.executable, "-c", CHILD, str(path), label, task, str(file)]
     environment = os.environ | {"PYTHONHASHSEED": str(seed), "PADDING": "x" * 100 * seed}
     done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
     assert done.returncode == 0, done.stderr
@@ -105,18 +82,17 @@ def child(path, label, task, file, seed):
 
 
 @pytest.mark.parametrize("label", ["2.0 CS", "3.0 CS", "3.0 ME"])
-def test_two_processes_write_the_same_bytes_and_a_third_continues_them(label, paths, binaries, tmp_path):
-    path = paths["mix", SETTINGS[label]["fmi"]]
+def test_two_processes_write_the_same_bytes_and_a_third_continues_them(label, binary, make, tmp_path):
+    path = binary(Mix, SETTINGS[label]["fmi"]).fmu
     first, second = (child(path, label, "write", tmp_path / f"{seed}", seed) for seed in (1, 2))
     assert first == second
     assert (tmp_path / "1").read_bytes() == (tmp_path / "2").read_bytes()
-    here = on_the_way(binaries, label)
-    assert state_bytes(here.component) == (tmp_path / "1").read_bytes()
+    here = on_the_way(make, label)
+    assert here.component.bytes() == (tmp_path / "1").read_bytes()
     announced = repr(here.update.next_time if here.update else None)
     assert child(path, label, announced, tmp_path / "1", 3) == first[1:]
     assert [repr(here.go_to(t)) for t in POINTS] == first[1:-1]
-    assert hashlib.sha256(state_bytes(here.component)).hexdigest() == first[-1]
-    here.component.free()
+    assert hashlib.sha256(here.component.bytes()).hexdigest() == first[-1]
 
 
 def refused(component, data, before):
@@ -126,13 +102,13 @@ def refused(component, data, before):
     assert (status, pointer.value) == (ERROR, None)
     [text] = component.errors
     assert component.binary.function("DeserializeFMUState") in text
-    return state_bytes(component) == before
+    return component.bytes() == before
 
 
 @pytest.mark.parametrize("label", ["2.0 ME", "3.0 CS"])
-def test_every_flipped_bit_of_the_header_and_every_truncation_is_refused(label, binaries):
-    component = on_the_way(binaries, label).component
-    data = state_bytes(component)
+def test_every_flipped_bit_of_the_header_and_every_truncation_is_refused(label, make):
+    component = on_the_way(make, label).component
+    data = component.bytes()
     for bit in range(8 * HEADER):
         flipped = bytearray(data)
         flipped[bit // 8] ^= 1 << bit % 8
@@ -141,61 +117,55 @@ def test_every_flipped_bit_of_the_header_and_every_truncation_is_refused(label, 
         assert refused(component, data[:size], data), size
     for more in (b"\0", b"\0" * 8, data):
         assert refused(component, data + more, data)
-    component.free()
 
 
-def test_bytes_of_another_model_or_version_are_refused(binaries):
-    ramps = instance(binaries["ramps"], "3.0 CS")
-    data = {label: state_bytes(on_the_way(binaries, label).component) for label in ("2.0 CS", "3.0 CS")}
+def test_bytes_of_another_model_or_version_are_refused(make):
+    ramps = make(Ramps, "3.0 CS")
+    data = {label: on_the_way(make, label).component.bytes() for label in ("2.0 CS", "3.0 CS")}
     for label in data:
-        component = on_the_way(binaries, label).component
-        own = state_bytes(component)
-        assert refused(component, state_bytes(ramps), own)
+        component = on_the_way(make, label).component
+        own = component.bytes()
+        assert refused(component, ramps.bytes(), own)
         assert refused(component, data["3.0 CS" if label == "2.0 CS" else "2.0 CS"], own)
-        component.free()
-    ramps.free()
 
 
-def test_a_state_of_another_kind_of_instance_is_refused_where_that_has_no_such_mode(binaries):
+def test_a_state_of_another_kind_of_instance_is_refused_where_that_has_no_such_mode(make):
     """Within one model the bytes are those of the model; what an instance cannot be in, it does not become."""
-    exchange, stepping = (on_the_way(binaries, label).component for label in ("3.0 ME", "3.0 CS without events"))
+    exchange, stepping = (on_the_way(make, label).component for label in ("3.0 ME", "3.0 CS without events"))
     for one, other in ((exchange, stepping), (stepping, exchange)):
-        before = state_bytes(one)
-        status, pointer = one.deserialize(state_bytes(other))
+        before = one.bytes()
+        status, pointer = one.deserialize(other.bytes())
         assert status == OK
         assert one.call("SetFMUState", pointer) == ERROR
-        assert state_bytes(one) == before
+        assert one.bytes() == before
         one.forget(pointer)
         assert one.call("SetFMUState", None) == ERROR
-    exchange.free()
-    stepping.free()
 
 
 @settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 @given(at=st.integers(0), byte=st.integers(1, 255), tail=st.binary(max_size=40))
-def test_random_damage_is_refused(at, byte, tail, binaries):
-    component = on_the_way(binaries, "2.0 CS", 0.05).component
-    data = bytearray(before := state_bytes(component))
+def test_random_damage_is_refused(at, byte, tail, make):
+    component = on_the_way(make, "2.0 CS", 0.05).component
+    data = bytearray(before := component.bytes())
     data[at % len(data)] ^= byte
     assert refused(component, bytes(data), before)
     if tail:
         assert refused(component, before + tail, before)
     assert refused(component, tail, before)
-    component.free()
 
 
 FORGED = """
 import random, struct, sys
 from pathlib import Path
 sys.path.insert(0, {support!r})
-from fmu_driver2 import OK, Binary
-from fmu_driver_journey import Journey, instance
-path, label, fmi, seed = sys.argv[1:]
+from fmi_driver.binary import OK, Binary
+from fmi_driver.journey import Journey, instance
+path, label, seed = sys.argv[1:]
 rng = random.Random(int(seed))
-binaries = {{fmi: Binary(Path(path))}}
-component = Journey(instance(binaries, label), 0.0, 2.0).component
+binary = Binary(path)
+component = Journey(instance(binary, label), 0.0, 2.0).component
 data = component.serialize(component.save())
-fresh = Journey(instance(binaries, label), 0.0, 2.0).go_to(0.5)
+fresh = Journey(instance(binary, label), 0.0, 2.0).go_to(0.5)
 values = [float("nan"), float("inf"), -float("inf"), 1e308, -1e308, 5e-324, -0.0, 1e18, -1.0]
 
 def checksum(block):
@@ -246,11 +216,11 @@ MANY = {label: 2000 if setting["kind"] == "me" else 150 for label, setting in SE
     ("label", "rounds"),
     [("2.0 CS", 60), ("3.0 ME", 300), *(pytest.param(label, n, marks=pytest.mark.long) for label, n in MANY.items())],
 )
-def test_forged_bytes_with_a_right_checksum_do_no_harm(label, rounds, paths):
+def test_forged_bytes_with_a_right_checksum_do_no_harm(label, rounds, binary):
     """Whoever can compute the checksum can put in anything: no crash, no hang, and a reset heals all."""
     fmi = SETTINGS[label]["fmi"]
     script = FORGED.format(support=SUPPORT, rounds=rounds)
-    command = [sys.executable, "-c", script, str(paths["mix", fmi]), label, fmi, str(rounds)]
+    command = [sys.executable, "-c", script, str(binary(Mix, fmi).fmu), label, str(rounds)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60 + rounds)
     assert done.returncode == 0, done.stderr[-2000:]
     _, taken, _, equal = done.stdout.split()
@@ -258,10 +228,10 @@ def test_forged_bytes_with_a_right_checksum_do_no_harm(label, rounds, paths):
     assert equal == "True"
 
 
-def test_places_are_what_they_are(binaries):
+def test_places_are_what_they_are(make):
     """What the tests above take for granted of the header."""
-    component = on_the_way(binaries, "3.0 CS").component
-    data = state_bytes(component)
+    component = on_the_way(make, "3.0 CS").component
+    data = component.bytes()
     assert struct.unpack("<Q", data[16:24])[0] == len(data) - HEADER
     assert data[32:HEADER] == component.binary.token
     assert any(data[CHECKSUM])
@@ -270,4 +240,3 @@ def test_places_are_what_they_are(binaries):
     assert component.call("SerializeFMUState", pointer, too_few, c.c_size_t(10)) == ERROR
     assert not any(too_few)
     component.forget(pointer)
-    component.free()

@@ -4,7 +4,8 @@ import itertools
 import zipfile
 
 import pytest
-from fmu_driver2 import ERROR, OK, Binary, Component
+from fmi_driver.binary import ERROR, OK, Binary
+from fmi_driver.component import Component
 from own_importer import exchange, step_through
 from tuned import CHANGES, JUMPS, POINTS, T_END, TIMES, Tuned, TunedAndDriven, exact
 
@@ -20,9 +21,9 @@ NAMES = [name for name in exact(0.0) if name not in ("last", "weight", "rest")]
 VERSIONS = pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 
 
-@pytest.fixture(scope="module")
-def path(exported):
-    return lambda fmi, model=Tuned: exported(model(), f"tuned-{model.__name__.lower()}", fmi)
+EVENTS, PLAIN = "3.0 CS", "3.0 CS without events"
+STEPPING = pytest.mark.parametrize("label", ["2.0 CS", PLAIN])
+KINDS = pytest.mark.parametrize("label", ["2.0 CS", "2.0 ME", EVENTS, "3.0 ME"])
 
 
 def check_jumps(jumps, tolerance=TIME):
@@ -45,21 +46,22 @@ def tuned_at(t):
 
 
 WAYS = {
-    "3.0, event mode": ("3.0", {"events": True, "early": True}, "event"),
-    "3.0, event mode, nobody obeys": ("3.0", {"events": True, "early": True}, "ignore"),
-    "3.0, event mode, set in step mode": ("3.0", {"events": True, "early": True}, "step"),
-    "3.0, event mode, no early return": ("3.0", {"events": True, "early": False}, "step"),
-    "3.0, no event mode": ("3.0", {}, "step"),
-    "2.0": ("2.0", {}, "step"),
+    # Setting, and where parameters are set; an importer that ignores the announced times steps over them.
+    "3.0, event mode": (EVENTS, "event"),
+    "3.0, event mode, nobody obeys": (EVENTS, "ignore"),
+    "3.0, event mode, set in step mode": (EVENTS, "step"),
+    "3.0, event mode, no early return": ("3.0 CS, events inside", "step"),
+    "3.0, no event mode": (PLAIN, "step"),
+    "2.0": ("2.0 CS", "step"),
 }
 
 
 @pytest.mark.parametrize(
     ("way", "model"), [*((way, Tuned) for way in WAYS), *((way, TunedAndDriven) for way in WAYS if way != "2.0")]
 )
-def test_co_simulation_gives_the_run_in_closed_form(way, model, path):
-    fmi, options, setting = WAYS[way]
-    component = Component(Binary(path(fmi, model)), "cs", logging=True, **options)
+def test_co_simulation_gives_the_run_in_closed_form(way, model, make):
+    label, setting = WAYS[way]
+    component = make(model, label, logging=True)
     update = component.begin(0.0, T_END)
     points = sorted({0.0, T_END, *TIMES, *POINTS})
     for start, end in itertools.pairwise(points):
@@ -77,41 +79,39 @@ def test_co_simulation_gives_the_run_in_closed_form(way, model, path):
             made = component.step(t, (end if announced is None else min(end, announced)) - t)
             assert made.status == OK, component.log
             t = made.time
-            if made.event and options.get("events"):
+            if made.event and component.events:
                 component.do("EnterEventMode")
                 update = component.settle()
         if end in POINTS:
             check_values(component, end)
     check_jumps(component.jumps)
-    component.free()
 
 
 @VERSIONS
-def test_an_importer_of_model_exchange_tunes_at_its_events(fmi, path):
-    run = exchange(path(fmi), T_END, list(POINTS), steps=CHANGES, names=NAMES)
+def test_an_importer_of_model_exchange_tunes_at_its_events(fmi, binary):
+    run = exchange(binary(Tuned, fmi).fmu, T_END, list(POINTS), steps=CHANGES, names=NAMES)
     check_jumps([(name, t) for t, name in run.jumps], 1e-8)
     for name in NAMES:
         assert run.values[name] == pytest.approx([exact(t)[name] for t in run.times], abs=1e-8)
 
 
-def test_our_importer_of_version_2_steps_through(path):
-    run = step_through(path("2.0"), T_END, list(POINTS), steps=CHANGES, names=NAMES)
+def test_our_importer_of_version_2_steps_through(binary):
+    run = step_through(binary(Tuned, "2.0").fmu, T_END, list(POINTS), steps=CHANGES, names=NAMES)
     check_jumps([(name, t) for t, name in run.jumps])
 
 
-def test_a_change_in_event_mode_renews_what_was_foretold(path):
-    component = Component(Binary(path("3.0")), "cs", events=True, early=True)
+def test_a_change_in_event_mode_renews_what_was_foretold(make):
+    component = make(Tuned, EVENTS)
     assert component.begin(0.0, 5.0).next_time == pytest.approx(0.45)
     for name, value, time in (("period", 0.3, 0.3), ("slope", 4.0, 0.25), ("slope", 1.0, 0.3), ("g", 200.0, 0.09)):
         component.do("EnterEventMode")
         component.set(name, value)
         assert component.settle().next_time == pytest.approx(time, abs=1e-12)
-    component.free()
 
 
-def test_a_guard_that_a_change_makes_true_is_seen_before_it_is_taken(path):
+def test_a_guard_that_a_change_makes_true_is_seen_before_it_is_taken(make):
     """In Event Mode outputs and clocks show the jump that comes next at this instant."""
-    component = Component(Binary(path("3.0")), "cs", events=True, early=True)
+    component = make(Tuned, EVENTS)
     component.begin(0.0, 5.0)
     assert component.step(0.0, 0.4).time == 0.4
     component.do("EnterEventMode")
@@ -121,24 +121,20 @@ def test_a_guard_that_a_change_makes_true_is_seen_before_it_is_taken(path):
     assert (component.get("x"), component.get("rounds"), component.get("rest")) == (0.0, 1, 1.0)
     component.settle()
     assert component.get("rounds") == 1
-    component.free()
 
 
-def test_a_guard_that_a_change_makes_true_ends_the_next_step_where_it_begins(path):
-    component = Component(Binary(path("3.0")), "cs", events=True, early=True)
+def test_a_guard_that_a_change_makes_true_ends_the_next_step_where_it_begins(make):
+    component = make(Tuned, EVENTS)
     component.begin(0.0, 5.0)
     component.step(0.0, 0.4)
     component.set("limit", 0.25)
     made = component.step(0.4, 0.1)
     assert (made.status, made.event, made.early, made.time) == (OK, True, True, 0.4)
-    component.free()
 
 
-@VERSIONS
-@pytest.mark.parametrize("kind", ["cs", "me"])
-def test_states_hold_the_tuned_values_and_reset_brings_back_the_start_values(fmi, kind, path):
-    binary = Binary(path(fmi))
-    component = Component(binary, kind, events=fmi == "3.0" and kind == "cs", early=fmi == "3.0")
+@KINDS
+def test_states_hold_the_tuned_values_and_reset_brings_back_the_start_values(label, make):
+    component = make(Tuned, label)
     component.begin()
     fresh = component.save()
     if component.starts_in_event_mode:
@@ -157,15 +153,12 @@ def test_states_hold_the_tuned_values_and_reset_brings_back_the_start_values(fmi
     assert (component.get("limit"), component.get("weight")) == (1.0, 16.0)
     for state in (fresh, tuned, restored):
         component.forget(state)
-    component.free()
 
 
-@VERSIONS
-@pytest.mark.parametrize("kind", ["cs", "me"])
-def test_when_parameters_may_be_set(fmi, kind, path):
+@KINDS
+def test_when_parameters_may_be_set(label, make):
     """Tunable ones at events and communication points, in Continuous-Time Mode never; fixed ones before the start."""
-    events = fmi == "3.0" and kind == "cs"
-    component = Component(Binary(path(fmi)), kind, events=events)
+    component = make(Tuned, label)
     assert (component.try_set("limit", 0.9), component.try_set("mass", 1.0)) == (OK, OK)
     component.enter_initialization()
     assert (component.try_set("limit", 0.8), component.try_set("mass", 1.5)) == (OK, OK)
@@ -174,15 +167,14 @@ def test_when_parameters_may_be_set(fmi, kind, path):
     assert "'mass' cannot be set in the state" in component.errors[-1]
     if component.starts_in_event_mode:
         component.settle()
-        assert component.try_set("limit", 0.6) == (OK if kind == "cs" else ERROR)
+        assert component.try_set("limit", 0.6) == (OK if component.kind == "cs" else ERROR)
     component.do("Terminate")
     assert component.try_set("limit", 0.5) == ERROR
-    component.free()
 
 
-@VERSIONS
-def test_elements_of_arrays_are_tuned(fmi, path):
-    component = Component(Binary(path(fmi)), "cs")
+@STEPPING
+def test_elements_of_arrays_are_tuned(label, make):
+    component = make(Tuned, label)
     component.begin()
     component.step(0.0, 0.4)
     assert component.get("mix") == pytest.approx(0.4, abs=STATE)
@@ -192,65 +184,62 @@ def test_elements_of_arrays_are_tuned(fmi, path):
     component.step(0.4, 0.2)
     # The timer has ticked at 0.55 s.
     assert component.get("mix") == pytest.approx(5.0 * 0.6 + 2.0, abs=STATE)
-    component.free()
 
 
-@VERSIONS
-def test_values_that_are_no_numbers_are_refused(fmi, path):
-    component = Component(Binary(path(fmi)), "cs")
+@STEPPING
+def test_values_that_are_no_numbers_are_refused(label, make):
+    component = make(Tuned, label)
     component.begin()
     for value in (float("nan"), float("inf")):
         assert component.try_set("limit", value) == ERROR
     assert component.get("limit") == 1.0
-    component.free()
 
 
-def test_an_intermediate_update_is_no_event(path):
+def test_an_intermediate_update_is_no_event(make):
     found = []
 
     def look(environment, time, *flags):
         found.append(component.try_set("limit", 0.25))
 
-    component = Component(Binary(path("3.0")), "cs", intermediate=look)
+    component = make(Tuned, PLAIN, intermediate=look)
     component.begin()
     component.step(0.0, 0.4)
     assert set(found) == {ERROR}
     assert component.get("limit") == 1.0
-    component.free()
 
 
-@VERSIONS
-def test_derivatives_are_those_at_the_tuned_values(fmi, path):
-    component = Component(Binary(path(fmi)), "cs")
+@STEPPING
+def test_derivatives_are_those_at_the_tuned_values(label, make):
+    component = make(Tuned, label)
     component.begin()
     component.step(0.0, 0.4)
     component.set("limit", 0.5)
     assert component.derivative("GetDirectionalDerivative", ["rest"], ["x"], [1.0]) == (OK, [-2.0])
     assert component.derivative("GetDirectionalDerivative", ["rest"], ["limit"], [1.0])[1] == pytest.approx([1.6])
-    component.free()
 
 
 @VERSIONS
-def test_the_description_says_which_are_tunable(fmi, path):
-    binary = Binary(path(fmi))
-    found = {name: v.variability for name, v in binary.variables.items() if v.causality == "parameter"}
+def test_the_description_says_which_are_tunable(fmi, binary):
+    loaded = binary(Tuned, fmi)
+    found = {name: v.variability for name, v in loaded.variables.items() if v.causality == "parameter"}
     assert {name for name, variability in found.items() if variability == "tunable"} == {*CHANGES, *gains(fmi)}
     assert found["mass"] == "fixed"
-    [output] = [u for u in binary.description.outputs if u.variable.name == "rest"]
+    [output] = [u for u in loaded.description.outputs if u.variable.name == "rest"]
     kinds = {v.name: kind for v, kind in zip(output.dependencies, output.dependenciesKind, strict=True)}
     assert kinds["x"] == "tunable"
     # rest = 1 - x / limit; FMI 2.0 has no parameters among the knowns of a running FMU.
     assert kinds == {"x": "tunable"} | ({"limit": "dependent"} if fmi == "3.0" else {})
-    [weight] = [u for u in binary.description.outputs if u.variable.name == "weight"]
+    [weight] = [u for u in loaded.description.outputs if u.variable.name == "weight"]
     assert [v.name for v in weight.dependencies] == (["g"] if fmi == "3.0" else [])
-    [fall] = [u for u in binary.description.derivatives if u.variable.name == "der(v)"]
+    [fall] = [u for u in loaded.description.derivatives if u.variable.name == "der(v)"]
     assert [v.name for v in fall.dependencies] == (["g"] if fmi == "3.0" else [])
 
 
 @VERSIONS
-def test_the_checker_and_the_page_know_them(fmi, path):
-    assert {finding.severity for finding in check_fmu(path(fmi)).findings} <= {Severity.NOTE}
-    with zipfile.ZipFile(path(fmi)) as archive:
+def test_the_checker_and_the_page_know_them(fmi, binary):
+    path = binary(Tuned, fmi).fmu
+    assert {finding.severity for finding in check_fmu(path).findings} <= {Severity.NOTE}
+    with zipfile.ZipFile(path) as archive:
         page = archive.read("documentation/index.html").decode()
     assert page.count("tunable parameter") == len(CHANGES) + len(gains(fmi))
     assert "may be set" in page
@@ -263,8 +252,7 @@ def network():
 def test_each_part_of_a_network_has_its_own(exported):
     """In a large network parts with equal maps share them, as loops over tables."""
     assert worth_looping(network())
-    binary = Binary(exported(network(), "tuned-choir"))
-    component = Component(binary, "cs", logging=True)
+    component = Component(Binary(exported(network(), "tuned-choir")), "cs", logging=True)
     component.begin()
     inputs = {"b.limit": hm.Signal(lambda t: 0.25 if t >= 0.4 else 1.0, [0.4])}
     arc = hm.simulate(network(), 1.2, inputs=inputs)

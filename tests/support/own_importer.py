@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import fmpy
 import numpy as np
+from fmi_driver.binary import elements
 from fmpy.fmi2 import FMU2Model, FMU2Slave, addLoggerProxy, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi3 import FMU3Model
 from scipy.integrate import DOP853
@@ -100,14 +101,6 @@ class Importer:
         self.run.times.append(t)
         for name in names:
             self.run.values.setdefault(name, []).append(float(self.get(name)))
-
-
-def elements(variable):
-    """The names of a variable's scalars, counted from 1 row by row, with its own name and their places in it."""
-    if not getattr(variable, "dimensions", None):
-        return [(variable.name, (variable.name, 0))]
-    indices = itertools.product(*(range(1, n + 1) for n in variable.shape))
-    return [(f"{variable.name}[{','.join(map(str, i))}]", (variable.name, k)) for k, i in enumerate(indices)]
 
 
 def changes_by_time(steps):

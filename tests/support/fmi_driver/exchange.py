@@ -4,7 +4,8 @@ import ctypes as c
 from typing import NamedTuple
 
 import numpy as np
-from fmu_driver2 import OK, doubles
+
+from fmi_driver.binary import OK, doubles
 
 STEP = 2e-3
 """Classical Runge-Kutta steps: an error of about 1e-11 in a second for flows of frequency 7 and below."""
@@ -24,7 +25,7 @@ class Exchange:
 
     Parameters
     ----------
-    component : fmu_driver2.Component
+    component : Component
         Made for Model Exchange.
     short : float
         Stops so much before each state event, as a part of the time of the run.

@@ -1,7 +1,8 @@
 """Going on with an instance of any version and kind, from wherever it is, to a later time."""
 
-from fmu_driver2 import DISCARD, OK, Component
-from fmu_driver_exchange import Exchange
+from fmi_driver.binary import DISCARD, OK
+from fmi_driver.component import Component
+from fmi_driver.exchange import Exchange
 
 SETTINGS = {
     "2.0 CS": {"fmi": "2.0", "kind": "cs"},
@@ -13,10 +14,9 @@ SETTINGS = {
 }
 
 
-def instance(binaries, label, **options):
-    """An instance of a setting; `binaries` are by version."""
-    setting = SETTINGS[label]
-    return Component(binaries[setting["fmi"]], **{k: v for k, v in setting.items() if k != "fmi"}, **options)
+def instance(binary, label, **options):
+    """An instance of a setting, which wants the binary of its version."""
+    return Component(binary, **{name: value for name, value in (SETTINGS[label] | options).items() if name != "fmi"})
 
 
 class Journey:

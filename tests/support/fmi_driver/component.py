@@ -1,65 +1,10 @@
-"""FMUs of both versions, for Co-Simulation and Model Exchange, driven by their plain C functions.
-
-Functions are called by their FMI 3.0 names without the prefix; `Binary.function` gives the name in the version at
-hand. Every status and every log line is kept, nothing is corrected or hidden.
-"""
+"""One instance of an FMU: every status and every log line is kept, nothing is corrected or hidden."""
 
 import ctypes as c
 import math
 from typing import NamedTuple
 
-import fmpy
-from fmu_driver import elements, unpacked
-
-OK, DISCARD, ERROR = 0, 2, 3
-CATEGORIES = ("logStatusError", "logEvents")
-OLD_NAMES = {
-    "GetFMUState": "GetFMUstate",
-    "SetFMUState": "SetFMUstate",
-    "FreeFMUState": "FreeFMUstate",
-    "SerializedFMUStateSize": "SerializedFMUstateSize",
-    "SerializeFMUState": "SerializeFMUstate",
-    "DeserializeFMUState": "DeSerializeFMUstate",
-    "UpdateDiscreteStates": "NewDiscreteStates",
-    "GetContinuousStateDerivatives": "GetDerivatives",
-    "GetOutputDerivatives": "GetRealOutputDerivatives",
-}
-C_TYPES = {
-    "Real": c.c_double,
-    "Integer": c.c_int32,
-    "Float64": c.c_double,
-    "Int32": c.c_int32,
-    "UInt64": c.c_uint64,
-    "Clock": c.c_bool,
-}
-LOGGERS = {
-    # The version 2 logger is variadic; its text is the one argument of the format "%s".
-    2: c.CFUNCTYPE(None, c.c_void_p, c.c_char_p, c.c_int, c.c_char_p, c.c_char_p, c.c_char_p),
-    3: c.CFUNCTYPE(None, c.c_void_p, c.c_int, c.c_char_p, c.c_char_p),
-}
-INTERMEDIATE = c.CFUNCTYPE(
-    None, c.c_void_p, c.c_double, *[c.c_bool] * 4, c.POINTER(c.c_bool), c.POINTER(c.c_double)
-)  # environment, time, set requested, get allowed, step finished, may return early, early return asked, its time
-
-
-class Callbacks(c.Structure):
-    """fmi2CallbackFunctions."""
-
-    _fields_ = [
-        ("logger", LOGGERS[2]),
-        ("allocate", c.c_void_p),
-        ("free", c.c_void_p),
-        ("finished", c.c_void_p),
-        ("environment", c.c_void_p),
-    ]
-
-
-class EventInfo(c.Structure):
-    """fmi2EventInfo."""
-
-    _fields_ = [(name, c.c_int) for name in ("again", "terminate", "nominals", "states", "defined")] + [
-        ("time", c.c_double)
-    ]
+from fmi_driver.binary import DISCARD, INTERMEDIATE, LOGGERS, OK, Callbacks, EventInfo, doubles, references
 
 
 class Line(NamedTuple):
@@ -88,52 +33,6 @@ class Step(NamedTuple):
     terminate: bool
     early: bool
     time: float
-
-
-class Binary:
-    """A loaded FMU and what its description says of the variables."""
-
-    def __init__(self, path):
-        self.description = fmpy.read_model_description(str(path), validate=False)
-        self.version = int(self.description.fmiVersion[0])
-        self.token = (self.description.guid if self.version == 2 else self.description.instantiationToken).encode()
-        [library] = (unpacked(path) / "binaries").rglob(f"*{fmpy.sharedLibraryExtension}")
-        self.path = library
-        self.functions = c.CDLL(str(library))
-        for name in ("fmi2Instantiate", "fmi3InstantiateCoSimulation", "fmi3InstantiateModelExchange"):
-            if name.startswith(f"fmi{self.version}"):
-                getattr(self.functions, name).restype = c.c_void_p
-        self.variables = {variable.name: variable for variable in self.description.modelVariables}
-        self.elements = {name: place for v in self.description.modelVariables for name, place in elements(v)}
-        self.states = [v.derivative.name for v in self.description.modelVariables if v.derivative is not None]
-        self.state_elements = [name for name, (whole, _) in self.elements.items() if whole in self.states]
-        self.n_states = len(self.state_elements)
-        self.clocks = [n for n, v in self.variables.items() if v.type == "Clock" and v.causality == "output"]
-        self.float_type = "Real" if self.version == 2 else "Float64"
-
-    def function(self, name):
-        """The C name of a function."""
-        if self.version == 3:
-            return f"fmi3{name}"
-        name = OLD_NAMES.get(name, name)
-        return "fmi2" + name.replace("Float64", "Real").replace("Int32", "Integer")
-
-    def reference(self, name):
-        return self.variables[name].valueReference
-
-    def boolean(self, value=False):
-        return (c.c_bool if self.version == 3 else c.c_int)(value)
-
-    def c_type(self, kind):
-        return (c.c_bool if self.version == 3 else c.c_int) if kind == "Boolean" else C_TYPES[kind]
-
-
-def references(numbers):
-    return (c.c_uint32 * max(len(numbers), 1))(*numbers)
-
-
-def doubles(values):
-    return (c.c_double * max(len(values), 1))(*values)
 
 
 class Component:
@@ -265,6 +164,8 @@ class Component:
     def try_set(self, name, value):
         """Set a variable, or an element of an array; returns the status."""
         whole, index = self.binary.elements[name]
+        if self.binary.variables[whole].type in ("Integer", "Int32"):
+            value = round(value)
         values = [value]
         if self.binary.variables[whole].shape:
             values = self.whole("Get", whole)[1]
@@ -298,23 +199,30 @@ class Component:
         again, terminate, _, changed, defined = (flag.value for flag in flags)
         return Update(status, again, terminate, changed, time.value if defined else None)
 
-    def settle(self):
-        """Event Mode to its end, and on to Step Mode or Continuous-Time Mode.
+    def iterate(self):
+        """Event Mode to its end.
 
-        Returns the last update, with `states_changed` if any of them said so.
+        Returns the clocks of each iteration that had some, and the last update, with `states_changed` if any of them
+        said so.
         """
-        changed = False
+        found, changed = [], False
         for _ in range(2000):
+            ticks = self.ticks()
             update = self.update()
-            changed = changed or update.states_changed
-            update = update._replace(states_changed=changed)
             assert update.status == OK, self.log[-3:]
-            if update.terminate:
-                return update
-            if not update.again:
-                self.do("EnterStepMode" if self.kind == "cs" else "EnterContinuousTimeMode")
-                return update
+            changed = changed or update.states_changed
+            if ticks:
+                found.append(ticks)
+            if update.terminate or not update.again:
+                return found, update._replace(states_changed=changed)
         raise AssertionError("2000 event iterations")
+
+    def settle(self):
+        """Event Mode to its end, and on to Step Mode or Continuous-Time Mode; returns the last update."""
+        _, update = self.iterate()
+        if not update.terminate:
+            self.do("EnterStepMode" if self.kind == "cs" else "EnterContinuousTimeMode")
+        return update
 
     def step(self, t, h):
         point, size = c.c_double(t), c.c_double(h)
@@ -358,6 +266,13 @@ class Component:
         data = (c.c_ubyte * size.value)()
         self.do("SerializeFMUState", pointer, data, size)
         return bytes(data)
+
+    def bytes(self):
+        """All of the present state."""
+        pointer = self.save()
+        data = self.serialize(pointer)
+        self.forget(pointer)
+        return data
 
     def deserialize(self, data):
         """Return the status and the state."""

@@ -4,7 +4,7 @@ import ctypes as c
 import math
 from typing import NamedTuple
 
-from fmu_driver2 import DISCARD, OK, EventInfo, doubles, references
+from fmi_driver.binary import DISCARD, OK, EventInfo, doubles, references
 
 SETTLED = {"event", "step", "continuous"}
 RUNNING = SETTLED | {"initialization", "terminated"}
