@@ -17,8 +17,7 @@ from hybrid_model.errors import (
     SimulationError,
     WiringError,
 )
-from hybrid_model.record.arc import HybridArc
-from hybrid_model.record.arc_file import load_arc
+from hybrid_model.record.arc import HybridArc, load_arc
 from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.samples import Samples
 from hybrid_model.reference.execution import Execution

@@ -14,6 +14,7 @@ from hybrid_model.errors import SimulationError
 from hybrid_model.record.arc import HybridArc
 from hybrid_model.record.arc_values import ComputedValues
 from hybrid_model.record.recording import Recording
+from hybrid_model.record.run_record import RunRecord
 from hybrid_model.reference.execution import Execution
 from hybrid_model.reference.zeno import ZenoGuard
 from hybrid_model.solver import Solver
@@ -84,11 +85,6 @@ def simulate(
             execution.stopped, execution.message = Stop.HORIZON, f"{automaton.name}: reached t = {t_end:.9g} s."
         else:
             recording.flowed(execution.flow(t_end))
-    return HybridArc(
-        ComputedValues(automaton, execution.inputs),
-        recording.flows,
-        recording.jumps,
-        stop=execution.stopped,
-        message=execution.message,
-        event_tolerance=execution.event_tolerance,
-    )
+    read = ComputedValues(automaton, execution.inputs)
+    stop, message = execution.stopped, execution.message
+    return HybridArc(RunRecord(read, recording.flows, recording.jumps, stop, message, execution.event_tolerance))

@@ -17,7 +17,7 @@ from hybrid_model.declare.state_space import LinearAutomaton, state_space
 from hybrid_model.declare.variables import FloatArray, Kind, Values, element_names, start_array, unknown_name
 from hybrid_model.errors import DeclarationError
 from hybrid_model.linear.jacobian import jacobian
-from hybrid_model.linear.operating_point import FrozenPoint, find_places, outputs_of_flow, read_outputs
+from hybrid_model.linear.operating_point import OperatingPoint, find_places, outputs_of_flow, read_outputs
 
 StateSpace: TypeAlias = control.StateSpace
 """python-control's class, for annotations."""
@@ -54,7 +54,7 @@ def flow_system(automaton: Automaton, z: Mapping[str, npt.ArrayLike] | None = No
     a late pulse in a table of inputs, in silence. ``solve_ivp_kwargs={"max_step": ...}`` with the shortest interval of
     the table, or the shortest pulse, prevents that.
     """
-    point = FrozenPoint(automaton)
+    point = OperatingPoint(automaton)
     layout = point.layout
     for name, value in (z or {}).items():
         point.put(name, value, (Kind.DISCRETE,))
@@ -127,7 +127,7 @@ def linearise(
     Derivatives are extrapolated central differences, see `hybrid_model.linear.jacobian`: exact to rounding for affine
     flows.
     """
-    point = FrozenPoint(automaton)
+    point = OperatingPoint(automaton)
     layout = point.layout
     for name, value in (at or {}).items():
         if name == "t":

@@ -17,7 +17,7 @@ VECTORS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
 """Kinds of the vectors that maps take, in the order of `Layout.values`."""
 
 
-class FrozenPoint:
+class OperatingPoint:
     """The start values of an automaton, computed ones included, and what is put in their place.
 
     Parameters

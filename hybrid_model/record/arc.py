@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bisect
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,12 @@ from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.real_numbers import real_array, told
 from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, unknown_name
 from hybrid_model.errors import DataError, DeclarationError
-from hybrid_model.record.arc_values import ArcValues
+from hybrid_model.record.arc_file import read_record, write_record
+from hybrid_model.record.arc_tables import dataframe, dataset
 from hybrid_model.record.flow_record import FlowRecord
 from hybrid_model.record.jump_record import JumpRecord
+from hybrid_model.record.run_record import RunRecord
 from hybrid_model.record.samples import Samples
-from hybrid_model.stop import Stop
 
 Interval = tuple[float, float]
 
@@ -28,16 +30,8 @@ class HybridArc:
 
     Parameters
     ----------
-    read : ArcValues
-        Reads variables off the flows.
-    flows : sequence of FlowRecord
-        In order; one more than jumps.
-    jumps : sequence of JumpRecord
-        Jump k leads from flow k to flow k + 1.
-    stop, message, event_tolerance
-        See the attributes.
-    first_j : int
-        Jump count of the first flow.
+    record : RunRecord
+        What the run has left.
 
     Attributes
     ----------
@@ -55,29 +49,15 @@ class HybridArc:
         What ran. That of a loaded arc has names, variables and jumps, but no maps.
     """
 
-    def __init__(
-        self,
-        read: ArcValues,
-        flows: Sequence[FlowRecord],
-        jumps: Sequence[JumpRecord],
-        *,
-        stop: Stop,
-        message: str,
-        event_tolerance: float,
-        first_j: int = 0,
-    ) -> None:
-        self._read = read
-        self._flows = list(flows)
-        self._first_j = first_j
-        self.automaton: Automaton = read.automaton
-        self.jumps = list(jumps)
-        self.stop = stop
-        self.message = message
-        self.event_tolerance = event_tolerance
-        self._starts, self._ends = [flow.t0 for flow in flows], [flow.t1 for flow in flows]
-        times = [[t for t, _ in flow.points] for flow in self._flows]
+    def __init__(self, record: RunRecord) -> None:
+        self._record, self._read, self._flows = record, record.read, record.flows
+        self.automaton: Automaton = record.read.automaton
+        self.jumps = list(record.jumps)
+        self.stop, self.message, self.event_tolerance = record.stop, record.message, record.event_tolerance
+        self._starts, self._ends = [flow.t0 for flow in record.flows], [flow.t1 for flow in record.flows]
+        times = [[t for t, _ in flow.points] for flow in record.flows]
         self.t: FloatArray = np.concatenate([np.array(row) for row in times])
-        self.j = np.concatenate([np.full(len(row), first_j + k) for k, row in enumerate(times)])
+        self.j = np.concatenate([np.full(len(row), record.first_j + k) for k, row in enumerate(times)])
 
     def __repr__(self) -> str:
         return (
@@ -175,7 +155,7 @@ class HybridArc:
         kept = [
             k
             for k, flow in enumerate(self._flows)
-            if first <= self._first_j + k <= last and flow.t1 >= a and flow.t0 <= b
+            if first <= self._record.first_j + k <= last and flow.t1 >= a and flow.t0 <= b
         ]
         if not kept:
             raise DeclarationError(
@@ -183,13 +163,12 @@ class HybridArc:
                 f"t = [{self.t[0]:g}, {self.t[-1]:g}] s and j = [{self.j[0]}, {self.j[-1]}]."
             )
         return HybridArc(
-            self._read,
-            [self._flows[k].cut(a, b) for k in kept],
-            self.jumps[kept[0] : kept[-1]],
-            stop=self.stop,
-            message=self.message,
-            event_tolerance=self.event_tolerance,
-            first_j=self._first_j + kept[0],
+            replace(
+                self._record,
+                flows=[self._flows[k].cut(a, b) for k in kept],
+                jumps=self.jumps[kept[0] : kept[-1]],
+                first_j=self._record.first_j + kept[0],
+            )
         )
 
     def resample(self, grid: npt.ArrayLike, names: Iterable[str] | None = None, *, both_sides: bool = False) -> Samples:
@@ -227,9 +206,9 @@ class HybridArc:
             number[firsts] = before
         else:
             number = after
-        points = [(float(t), self._flows[k]) for t, k in zip(times, number, strict=True)]
+        points = [(float(t), self._flows[int(k)]) for t, k in zip(times, number, strict=True)]
         values = self._table(names, [(t, flow.at(t), flow.z) for t, flow in points])
-        return Samples(times, number + self._first_j, values)
+        return Samples(times, number + self._record.first_j, values)
 
     def samples(self, names: Iterable[str] | None = None) -> Samples:
         """Return the run's own samples: every solver step and both sides of every jump.
@@ -297,15 +276,11 @@ class HybridArc:
 
     def to_dataframe(self, names: Iterable[str] | None = None) -> Any:
         """Return the samples as a pandas DataFrame, see `hybrid_model.record.arc_tables.dataframe`."""
-        from hybrid_model.record.arc_tables import dataframe
-
-        return dataframe(self, names)
+        return dataframe(self._record, self.samples(names))
 
     def to_xarray(self, names: Iterable[str] | None = None) -> Any:
         """Return the samples as an xarray Dataset, see `hybrid_model.record.arc_tables.dataset`."""
-        from hybrid_model.record.arc_tables import dataset
-
-        return dataset(self, names)
+        return dataset(self._record, self.samples(names))
 
     def save(self, path: str | Path) -> None:
         """Write the arc to a file; its name decides in which form.
@@ -321,13 +296,11 @@ class HybridArc:
         DataError
             For a name with another ending.
         """
-        from hybrid_model.record.arc_file import save_arc
-
         ending = Path(path).suffix.lower()
         if ending == ".csv":
             self.samples().to_csv(path)
         elif ending == ".npz":
-            save_arc(self._read, self._flows, self, Path(path))
+            write_record(self._record, Path(path))
         else:
             raise DataError(
                 f"{path} ends in {ending!r}, but an arc is saved as .npz, which hm.load_arc reads, or as .csv, its "
@@ -369,10 +342,35 @@ class HybridArc:
         return flow
 
     def _flow_of(self, j: Any) -> FlowRecord:
-        number = j - self._first_j
+        number = j - self._record.first_j
         if not 0 <= number < len(self._flows) or number != int(number):
             raise DeclarationError(f"the run has no jump count j = {j}: it covers {self.j[0]} to {self.j[-1]}.")
         return self._flows[int(number)]
+
+
+def load_arc(path: str | Path) -> HybridArc:
+    """Read an arc that `HybridArc.save` has written.
+
+    The arc answers all that the saved one does, samples bit by bit and interpolated values to rounding. Its automaton
+    has names, variables and jumps; its maps are not in the file and say so when they are called.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    HybridArc
+
+    Raises
+    ------
+    DataError
+        If the file is no saved arc, is damaged, or has a version of the schema that this package does not know.
+    FileNotFoundError
+        If there is no file.
+    """
+    return HybridArc(read_record(Path(path)))
 
 
 def _times(given: npt.ArrayLike) -> FloatArray:

@@ -20,13 +20,13 @@ import numpy as np
 from hybrid_model.declare.transitions import ClockInfo, JumpInfo, Priority, Trigger
 from hybrid_model.declare.variables import FloatArray, Kind, Variable
 from hybrid_model.errors import DataError
-from hybrid_model.record.arc import HybridArc
-from hybrid_model.record.arc_values import ArcValues, RecordedValues
+from hybrid_model.record.arc_values import ArcValues, LoadedValues
 from hybrid_model.record.flow_piece import FlowPiece
 from hybrid_model.record.flow_record import FlowRecord
 from hybrid_model.record.interpolants import Interpolant, Polynomial, interpolate
 from hybrid_model.record.jump_record import JumpRecord
-from hybrid_model.record.kept_automaton import RecordedAutomaton
+from hybrid_model.record.loaded_automaton import LoadedAutomaton
+from hybrid_model.record.run_record import RunRecord
 from hybrid_model.stop import Stop
 
 SCHEMA = "hybrid-fmu hybrid arc"
@@ -42,44 +42,35 @@ UNREADABLE = (zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, V
 Table = Mapping[str, Any]
 
 
-def save_arc(read: ArcValues, flows: Sequence[FlowRecord], arc: HybridArc, path: Path) -> None:
-    """Write an arc to a file; `HybridArc.save` calls it.
-
-    Parameters
-    ----------
-    read : ArcValues
-        Reads the arc's variables.
-    flows : sequence of FlowRecord
-        Its flows.
-    arc : HybridArc
-        The arc.
-    path : Path
-        Where to write; an existing file is replaced.
-    """
+def write_record(record: RunRecord, path: Path) -> None:
+    """Write a run to a file, which it replaces; `HybridArc.save` calls it."""
+    read, flows = record.read, record.flows
+    points = [(t, record.first_j + k) for k, flow in enumerate(flows) for t, _ in flow.points]
+    t, j = (np.array(column) for column in zip(*points, strict=True))
     samples = np.array([read.channels(t, x, flow.z) for flow in flows for t, x in flow.points])
     scale = np.max(np.abs(samples), axis=0, initial=0.0)
     tolerance = np.maximum(ROUNDING * scale, np.finfo(np.float64).tiny)
     fitted = [_dense(read, piece, flow.z, tolerance) for flow in flows for piece in flow.pieces]
     parts = [part for interpolant, _ in fitted for part in interpolant.parts]
     sides = {
-        f"jump_{side}": _rows([getattr(jump, side) for jump in arc.jumps])
+        f"jump_{side}": _rows([getattr(jump, side) for jump in record.jumps])
         for side in ("x_before", "z_before", "x_after", "z_after")
     }
-    times, parameters = read.parameter_steps(float(arc.t[0]), float(arc.t[-1]))
+    times, parameters = read.parameter_steps(float(t[0]), float(t[-1]))
     content: dict[str, Any] = {
         "schema": np.array(SCHEMA),
         "version": np.array(VERSION),
-        "about": np.frombuffer(json.dumps(_about(arc)).encode(), dtype=np.uint8),
-        "start_values": np.concatenate([np.zeros(0), *(v.start.ravel() for v in arc.automaton.variables)]),
+        "about": np.frombuffer(json.dumps(_about(record)).encode(), dtype=np.uint8),
+        "start_values": np.concatenate([np.zeros(0), *(v.start.ravel() for v in read.automaton.variables)]),
         "parameter_times": times,
         "parameters": parameters,
-        "event_tolerance": np.array(arc.event_tolerance),
-        "t": arc.t,
-        "j": arc.j,
+        "event_tolerance": np.array(record.event_tolerance),
+        "t": t,
+        "j": j,
         "channels": samples,
         "discrete": np.array([flow.z[: read.layout.sizes[Kind.DISCRETE]] for flow in flows]),
-        "jump_t": np.array([jump.t for jump in arc.jumps], dtype=np.float64),
-        "jump_index": np.array([jump.index for jump in arc.jumps], dtype=np.int64),
+        "jump_t": np.array([jump.t for jump in record.jumps], dtype=np.float64),
+        "jump_index": np.array([jump.index for jump in record.jumps], dtype=np.int64),
         **sides,
         "piece_parts": np.array([len(interpolant.parts) for interpolant, _ in fitted], dtype=np.int64),
         "part_ends": np.array([(part.a, part.b) for part in parts], dtype=np.float64).reshape(-1, 2),
@@ -91,35 +82,15 @@ def save_arc(read: ArcValues, flows: Sequence[FlowRecord], arc: HybridArc, path:
         np.savez_compressed(file, allow_pickle=False, **content)
 
 
-def load_arc(path: str | Path) -> HybridArc:
-    """Read an arc that `HybridArc.save` has written.
-
-    The arc answers all that the saved one does, samples bit by bit and interpolated values to rounding. Its automaton
-    has names, variables and jumps; its maps are not in the file and say so when they are called.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
-    Returns
-    -------
-    HybridArc
-
-    Raises
-    ------
-    DataError
-        If the file is no saved arc, is damaged, or has a version of the schema that this package does not know.
-    FileNotFoundError
-        If there is no file.
-    """
-    if Path(path).suffix.lower() == ".csv":
+def read_record(path: Path) -> RunRecord:
+    """Read what `write_record` has written; `load_arc` calls it and says what it raises."""
+    if path.suffix.lower() == ".csv":
         raise DataError(
             f"{path} holds samples alone, if anything: read it by hm.Samples.from_csv; arcs are .npz files."
         )
-    content = _content(Path(path))
+    content = _content(path)
     try:
-        return _arc(content)
+        return _record(content)
     except (KeyError, ValueError, IndexError, TypeError) as error:
         raise DataError(f"{path} is damaged: its parts do not fit together ({error}); save the arc anew.") from error
 
@@ -164,16 +135,16 @@ def _dense(read: ArcValues, piece: FlowPiece, z: FloatArray, tolerance: FloatArr
 
 
 def _stored_error(read: ArcValues, width: int) -> FloatArray:
-    return read.errors if isinstance(read, RecordedValues) else np.zeros(width)
+    return read.errors if isinstance(read, LoadedValues) else np.zeros(width)
 
 
 def _rows(vectors: Sequence[FloatArray]) -> FloatArray:
     return np.array(vectors) if vectors else np.zeros((0, 0))
 
 
-def _about(arc: HybridArc) -> dict[str, Any]:
+def _about(record: RunRecord) -> dict[str, Any]:
     """Return what is text: names, units, flags, and how the run ended."""
-    automaton = arc.automaton
+    automaton = record.read.automaton
     variables = []
     for variable in automaton.variables:
         entry = {key: getattr(variable, key) for key in Variable.__dataclass_fields__ if key not in ("kind", "start")}
@@ -185,12 +156,12 @@ def _about(arc: HybridArc) -> dict[str, Any]:
         "variables": variables,
         "jumps": [{**asdict(info), "trigger": info.trigger.name} for info in automaton.jumps],
         "clocks": [asdict(clock) for clock in automaton.clocks],
-        "stop": arc.stop.name,
-        "message": arc.message,
+        "stop": record.stop.name,
+        "message": record.message,
     }
 
 
-def _automaton(about: Table, starts: FloatArray) -> RecordedAutomaton:
+def _automaton(about: Table, starts: FloatArray) -> LoadedAutomaton:
     variables = []
     at = 0
     for entry in about["variables"]:
@@ -201,7 +172,7 @@ def _automaton(about: Table, starts: FloatArray) -> RecordedAutomaton:
         flags["dimensions"] = tuple(flags.get("dimensions", ()))
         variables.append(Variable(kind=Kind[entry["kind"]], start=start, **flags))
         at += size
-    return RecordedAutomaton(
+    return LoadedAutomaton(
         about["automaton"],
         tuple(variables),
         tuple(JumpInfo(**{**entry, "trigger": Trigger[entry["trigger"]]}) for entry in about["jumps"]),
@@ -211,12 +182,12 @@ def _automaton(about: Table, starts: FloatArray) -> RecordedAutomaton:
     )
 
 
-def _arc(content: Table) -> HybridArc:
+def _record(content: Table) -> RunRecord:
     about = json.loads(content["about"].tobytes().decode())
     automaton = _automaton(about, content["start_values"])
     times = content.get("parameter_times", content["t"][:1])
     parameters = np.atleast_2d(content["parameters"])
-    read = RecordedValues(automaton, times, parameters, content["interpolation_error"])
+    read = LoadedValues(automaton, times, parameters, content["interpolation_error"])
     _require_lengths(content, sum(read.layout.sizes[kind] for kind in (Kind.STATE, Kind.INPUT, Kind.OUTPUT)))
     flows = _flows(content)
     first = int(content["j"][0])
@@ -225,7 +196,7 @@ def _arc(content: Table) -> HybridArc:
         JumpRecord(float(t), first + k, int(index), automaton.jumps[index].name, *row)
         for k, (t, index, *row) in enumerate(zip(content["jump_t"], content["jump_index"], *sides, strict=True))
     ]
-    return HybridArc(
+    return RunRecord(
         read,
         flows,
         jumps,

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any
 
 from hybrid_model.declare.variables import FloatArray, Kind, element_names
 from hybrid_model.errors import DataError
+from hybrid_model.record.run_record import RunRecord
+from hybrid_model.record.samples import Samples
 
-if TYPE_CHECKING:
-    from hybrid_model.record.arc import HybridArc
 
-
-def dataframe(arc: HybridArc, names: Iterable[str] | None = None) -> Any:
+def dataframe(record: RunRecord, samples: Samples) -> Any:
     """Return the samples of an arc as a pandas DataFrame.
 
     Parameters
     ----------
-    arc : HybridArc
+    record : RunRecord
         The run.
-    names : iterable of str, optional
-        Which variables; default: all but the parameters that are fixed for a run.
+    samples : Samples
+        Its samples, of the variables wanted.
 
     Returns
     -------
@@ -37,28 +33,27 @@ def dataframe(arc: HybridArc, names: Iterable[str] | None = None) -> Any:
         If pandas is not installed.
     """
     pandas = _installed("pandas", "to_dataframe")
-    samples = arc.samples(names)
     index = pandas.MultiIndex.from_arrays([samples.t, samples.j], names=["t", "j"])
     frame = pandas.DataFrame(samples.columns(), index=index)
-    variables = [arc.variable(name) for name in samples.values]
+    variables = [record.read.variable(name) for name in samples.values]
     frame.attrs.update(
-        _about(arc),
+        _about(record),
         units={column: v.unit for v in variables for column in element_names(v)},
         descriptions={column: v.description for v in variables for column in element_names(v)},
-        parameters={name: value.tolist() for name, value in _parameters(arc).items()},
+        parameters={name: value.tolist() for name, value in _parameters(record).items()},
     )
     return frame
 
 
-def dataset(arc: HybridArc, names: Iterable[str] | None = None) -> Any:
+def dataset(record: RunRecord, samples: Samples) -> Any:
     """Return the samples of an arc as an xarray Dataset.
 
     Parameters
     ----------
-    arc : HybridArc
+    record : RunRecord
         The run.
-    names : iterable of str, optional
-        Which variables; default: all but the parameters that are fixed for a run.
+    samples : Samples
+        Its samples, of the variables wanted.
 
     Returns
     -------
@@ -74,34 +69,34 @@ def dataset(arc: HybridArc, names: Iterable[str] | None = None) -> Any:
     """
     xarray = _installed("xarray", "to_xarray")
     pandas = _installed("pandas", "to_xarray")
-    samples = arc.samples(names)
     index = pandas.MultiIndex.from_arrays([samples.t, samples.j], names=["t", "j"])
     data = {}
     for name, value in samples.values.items():
-        variable = arc.variable(name)
+        variable = record.read.variable(name)
         about = {"units": variable.unit, "description": variable.description, "kind": variable.kind.value}
         dimensions = ["sample", *(f"{name}_{k + 1}" for k in range(value.ndim - 1))]
         data[name] = (dimensions, value, about)
     coordinates = xarray.Coordinates.from_pandas_multiindex(index, "sample")
-    attributes = {**_about(arc), **{name: value.tolist() for name, value in _parameters(arc).items()}}
+    attributes = {**_about(record), **{name: value.tolist() for name, value in _parameters(record).items()}}
     result = xarray.Dataset(data, coords=coordinates, attrs=attributes)
     result["t"].attrs.update(units="s", description="time")
     result["j"].attrs.update(units="1", description="jumps so far")
     return result
 
 
-def _about(arc: HybridArc) -> dict[str, Any]:
+def _about(record: RunRecord) -> dict[str, Any]:
     return {
-        "automaton": arc.automaton.name,
-        "stop": arc.stop.name,
-        "message": arc.message,
-        "event_tolerance": arc.event_tolerance,
+        "automaton": record.read.automaton.name,
+        "stop": record.stop.name,
+        "message": record.message,
+        "event_tolerance": record.event_tolerance,
     }
 
 
-def _parameters(arc: HybridArc) -> dict[str, FloatArray]:
-    fixed = [v.name for v in arc.automaton.of_kind(Kind.PARAMETER) if not v.tunable]
-    return {name: np.asarray(arc.at(name, arc.t[0])) for name in fixed}
+def _parameters(record: RunRecord) -> dict[str, FloatArray]:
+    read, first = record.read, record.flows[0]
+    fixed = [v.name for v in read.automaton.of_kind(Kind.PARAMETER) if not v.tunable]
+    return {name: read.value(name, first.t0, first.x0, first.z) for name in fixed}
 
 
 def _installed(package: str, what: str) -> Any:

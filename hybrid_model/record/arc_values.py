@@ -167,7 +167,7 @@ class ReceivedValues(ComputedValues):
         return self._signals.with_held(self._held[max(last, 0)], t)
 
 
-class RecordedValues(ArcValues):
+class LoadedValues(ArcValues):
     """Reads an arc whose flows carry states, inputs and outputs, see `ArcValues.channels`.
 
     Parameters

@@ -10,7 +10,7 @@ from hybrid_model.record.recording import Recording
 from hybrid_model.reference.borders import instant
 from hybrid_model.reference.execution import Execution
 from hybrid_model.schedule.blocks import Block, Step, Termination, Update
-from hybrid_model.schedule.predicted_run import Lookahead, take_internal
+from hybrid_model.schedule.predicted_run import PredictedRun, take_internal
 from hybrid_model.stop import Stop
 
 
@@ -54,7 +54,7 @@ class AutomatonBlock(Block):
         self.run = run
         self.recording = Recording(run.t, run.j, run.x, run.z, run.inputs.held, keep=keep)
         self._t_stop, self._predictable, self._events = t_stop, predictable, events
-        self._ahead: Lookahead | None = None
+        self._ahead: PredictedRun | None = None
         self._places = {element: (kind, k) for kind in Kind for k, element in enumerate(run.layout.names(kind))}
 
     def begin(self) -> None:
@@ -172,7 +172,7 @@ class AutomatonBlock(Block):
         if not self._predictable or self.run.t >= self._t_stop:
             return None
         if self._ahead is None:
-            self._ahead = Lookahead.from_run(self.run, self._t_stop)
+            self._ahead = PredictedRun.from_run(self.run, self._t_stop)
         # A run that ends where it is has no time to announce; the next step says why it ends.
         return self._ahead.end.t if self._ahead.end.t > self.run.t else None
 

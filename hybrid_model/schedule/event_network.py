@@ -24,6 +24,7 @@ from hybrid_model.errors import SimulationError, WiringError
 from hybrid_model.record.arc import HybridArc
 from hybrid_model.record.arc_values import ReceivedValues
 from hybrid_model.record.jump_record import JumpRecord
+from hybrid_model.record.run_record import RunRecord
 from hybrid_model.reference.execution import Execution
 from hybrid_model.reference.zeno import ZenoGuard
 from hybrid_model.schedule.automaton_block import AutomatonBlock
@@ -197,12 +198,5 @@ def _result(
         run, recording = block.run, block.recording
         read = ReceivedValues(run.automaton, run.inputs, recording.received)
         flows = [replace(flow, z=np.append(flow.z, j)) for j, flow in enumerate(recording.flows)]
-        arcs[part] = HybridArc(
-            read,
-            flows,
-            recording.jumps,
-            stop=stop,
-            message=message,
-            event_tolerance=run.event_tolerance,
-        )
+        arcs[part] = HybridArc(RunRecord(read, flows, recording.jumps, stop, message, run.event_tolerance))
     return NetworkRun(arcs, stop, message, t)

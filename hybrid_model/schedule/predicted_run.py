@@ -33,7 +33,7 @@ class _Flown:
 
 
 @dataclass
-class Lookahead:
+class PredictedRun:
     """The way from an execution's present to its next event, or to where the look-ahead ended.
 
     Attributes
@@ -46,7 +46,7 @@ class Lookahead:
     _way: deque[_Flown | JumpRecord] = field(default_factory=deque)
 
     @classmethod
-    def from_run(cls, run: Execution, t_stop: float) -> Lookahead:
+    def from_run(cls, run: Execution, t_stop: float) -> PredictedRun:
         """Look ahead from `run`, at most to `t_stop` in s and over a bounded number of solver steps.
 
         What is set from outside at a known time can change outputs there, so the next such time ends the look-ahead.

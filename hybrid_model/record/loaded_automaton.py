@@ -10,7 +10,7 @@ from hybrid_model.declare.variables import Value, Values, Variable
 from hybrid_model.errors import DeclarationError
 
 
-class RecordedAutomaton(Automaton):
+class LoadedAutomaton(Automaton):
     """The automaton of a loaded arc: it can be read, and not run.
 
     Parameters

@@ -1,0 +1,38 @@
+"""What a run leaves: its flows and jumps, how to read variables off them, and why it ended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hybrid_model.record.arc_values import ArcValues
+from hybrid_model.record.flow_record import FlowRecord
+from hybrid_model.record.jump_record import JumpRecord
+from hybrid_model.stop import Stop
+
+
+@dataclass(frozen=True, eq=False)
+class RunRecord:
+    """A run, or a part of one.
+
+    Attributes
+    ----------
+    read : ArcValues
+        Reads variables off the flows.
+    flows : sequence of FlowRecord
+        In order; one more than jumps.
+    jumps : sequence of JumpRecord
+        Jump k leads from flow k to flow k + 1.
+    stop, message, event_tolerance
+        See `HybridArc`.
+    first_j : int
+        Jump count of the first flow.
+    """
+
+    read: ArcValues
+    flows: Sequence[FlowRecord]
+    jumps: Sequence[JumpRecord]
+    stop: Stop
+    message: str
+    event_tolerance: float
+    first_j: int = 0
