@@ -26,7 +26,8 @@ from fmu.importer.callbacks import Callbacks
 from fmu.importer.loading import load_binary, read_description
 from fmu.importer.temporary_folders import temporary_folder
 from fmu.importer.unpacking import unpack
-from fmu.importer.values import access, exact
+from fmu.importer.values import exact
+from fmu.standard.value_types import accessor
 
 FloatArray = npt.NDArray[np.float64]
 MAX_ITERATIONS = 1000
@@ -226,7 +227,7 @@ class FlowFunctions:
 
     def _set(self, variable: Any, values: list[float]) -> None:
         numbers = [exact(variable, value, str(variable.name)) for value in values]
-        getattr(self._fmu, f"set{access(variable, fmi2=self._fmi2)}")([variable.valueReference], numbers)
+        getattr(self._fmu, f"set{accessor(variable.type, 2 if self._fmi2 else 3)}")([variable.valueReference], numbers)
 
     def _sensitivity(self, unknowns: list[Any], known: Any, place: int) -> list[float]:
         references = [variable.valueReference for variable in unknowns]

@@ -12,7 +12,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2LastSuccessfulTime, fmi2Termin
 from cosim.instances.instance import Advance, FmuInstance, Getter
 from fmu.importer.callbacks import Callbacks
 from fmu.importer.loading import load_binary
-from fmu.importer.values import access
+from fmu.standard.value_types import accessor
 
 
 class Fmi2Instance(FmuInstance):
@@ -39,11 +39,11 @@ class Fmi2Instance(FmuInstance):
 
     def getter(self, variable: Any, size: int) -> Getter:
         """See `FmuInstance.getter`."""
-        return getattr(self.fmu, f"get{access(variable, fmi2=True)}"), ([variable.valueReference],)
+        return getattr(self.fmu, f"get{accessor(variable.type, 2)}"), ([variable.valueReference],)
 
     def set(self, variable: Any, values: Sequence[Any]) -> None:
         """See `FmuInstance.set`."""
-        getattr(self.fmu, f"set{access(variable, fmi2=True)}")([variable.valueReference], values)
+        getattr(self.fmu, f"set{accessor(variable.type, 2)}")([variable.valueReference], values)
 
     def step(self, t: float, size: float) -> Advance:
         """See `FmuInstance.step`."""

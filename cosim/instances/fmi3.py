@@ -10,7 +10,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from cosim.instances.instance import Advance, FmuInstance, Getter
 from fmu.importer.loading import load_binary
-from fmu.importer.values import access
+from fmu.standard.value_types import accessor
 
 
 class Fmi3Instance(FmuInstance):
@@ -33,11 +33,11 @@ class Fmi3Instance(FmuInstance):
 
     def getter(self, variable: Any, size: int) -> Getter:
         """See `FmuInstance.getter`."""
-        return getattr(self.fmu, f"get{access(variable, fmi2=False)}"), ([variable.valueReference], size)
+        return getattr(self.fmu, f"get{accessor(variable.type, 3)}"), ([variable.valueReference], size)
 
     def set(self, variable: Any, values: Sequence[Any]) -> None:
         """See `FmuInstance.set`."""
-        getattr(self.fmu, f"set{access(variable, fmi2=False)}")([variable.valueReference], values)
+        getattr(self.fmu, f"set{accessor(variable.type, 3)}")([variable.valueReference], values)
 
     def step(self, t: float, size: float) -> Advance:
         """See `FmuInstance.step`."""

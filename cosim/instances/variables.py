@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.slave import Port
-from fmu.importer.values import DISCRETE, INTEGERS, TYPES
+from fmu.standard.value_types import DISCRETE, INTEGERS, TYPES
 
 KINDS = {"String": "text", "Binary": "bytes"}
 """What ports of these types carry; those of all others carry numbers."""

@@ -7,19 +7,10 @@ import math
 import operator
 from typing import Any
 
+from fmu.standard.value_types import FLOATS, limits
+
 Value = float | str | bytes
 """What a variable holds: a number, an int or bool exactly as such, a text, or bytes."""
-FLOATS = {"Real": 1.7976931348623157e308, "Float64": 1.7976931348623157e308, "Float32": 3.4028234663852886e38}
-"""Types that hold numbers with a fraction, and the largest number of each."""
-BITS = {"Integer": 32, **{f"Int{bits}": bits for bits in (8, 16, 32, 64)}}
-"""Types that hold whole numbers with a sign, and the bits of each."""
-UNSIGNED_BITS = {f"UInt{bits}": bits for bits in (8, 16, 32, 64)}
-"""Types that hold whole numbers without a sign, and the bits of each."""
-INTEGERS = {*BITS, *UNSIGNED_BITS, "Enumeration"}
-DISCRETE = {*INTEGERS, "Boolean", "String", "Binary"}
-"""Types whose values change at events alone."""
-TYPES = {*FLOATS, *DISCRETE}
-"""All types but clocks."""
 _DIGITS = 400
 """Longest number that is read digit by digit; none that fits any type is longer."""
 
@@ -120,23 +111,9 @@ def require_within(variable: Any, value: Any, name: str) -> None:
     for bound, beyond, word in (("min", operator.lt, "below"), ("max", operator.gt, "above")):
         text = getattr(variable, bound) or (getattr(declared, bound) if declared else None)
         read = float if variable.type in FLOATS else decimal.Decimal  # no rounding in 64-bit integers
-        limit = None if text is None else read(text.replace("INF", "Infinity"))
+        limit = None if text is None else read(text)
         if limit is not None and beyond(value, limit):
             raise UnfitError(f"{name} is set to {value}, {word} its {bound}imum {text}: give a value in its range.")
-
-
-def access(variable: Any, *, fmi2: bool) -> str:
-    """Return the type in the names of the functions that get and set a variable."""
-    whole = "Integer" if fmi2 else "Int64"
-    return whole if variable.type == "Enumeration" else str(variable.type)
-
-
-def limits(kind: str) -> tuple[int, int]:
-    """Return the smallest and the largest number that a type of whole numbers holds."""
-    if kind in UNSIGNED_BITS:
-        return 0, 2 ** UNSIGNED_BITS[kind] - 1
-    half = 2 ** (BITS[kind] - 1)
-    return -half, half - 1
 
 
 def shown(value: Value) -> str:

@@ -6,7 +6,7 @@ import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from fmu.standard.functions import function
+from fmu.standard.functions import spelled
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def declared(major: int, kind: str) -> dict[str, str]:
 def promised(major: int, attributes: Mapping[str, str]) -> dict[str, str]:
     """Return the functions that the capabilities of an interface type promise, each with the attribute that does."""
     return {
-        function(major, name): capability.attribute(major)
+        spelled(major, name): capability.attribute(major)
         for capability in Capability
         if capability.claimed(attributes, major)
         for name in capability.value.functions

@@ -46,7 +46,7 @@ _SPELLED2 = {
 """Functions that FMI 2.0 has under another name than FMI 3.0."""
 
 
-def function(major: int, name: str) -> str:
+def spelled(major: int, name: str) -> str:
     """Return the name that a function of FMI 3.0 has in a version, ``fmi2GetFMUstate`` for ``GetFMUState``."""
     return f"fmi{major}{_SPELLED2.get(name, name) if major == 2 else name}"
 

@@ -9,6 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from fmu.standard.functions import spelled
+
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 PLACE_BYTES = 512
@@ -81,12 +83,12 @@ class Recorder:
 
 
 class Library:
-    """A loaded binary and one instance of its FMU.
+    """A loaded binary and one instance of its FMU; functions go by their names of FMI 3.0.
 
     Where it is `lenient`, a refused call ends the experiment without a finding.
     """
 
-    prefix = ""
+    major: int
 
     def __init__(self, plan: dict[str, Any], recorder: Recorder) -> None:
         self.plan, self.recorder = plan, recorder
@@ -108,17 +110,21 @@ class Library:
             return Stopped()
         return self.recorder.stop("run.load", f"The binary cannot be loaded: {problem}.", EXTERNAL)
 
+    def spelled(self, name: str) -> str:
+        """Return the whole name of a function of FMI 3.0 in this version of the standard."""
+        return spelled(self.major, name)
+
     def function(self, name: str) -> Callable[..., Any]:
         """Look up a function."""
         try:
-            found: Callable[..., Any] = getattr(self.library, self.prefix + name)
+            found: Callable[..., Any] = getattr(self.library, self.spelled(name))
         except AttributeError as error:
-            raise self.recorder.stop("run.load", f"{self.prefix}{name} is missing in the binary.") from error
+            raise self.recorder.stop("run.load", f"{self.spelled(name)} is missing in the binary.") from error
         return found
 
     def call(self, name: str, *arguments: Any, shown: str = "") -> int:
         """Call a function of the instance and return its status."""
-        self.recorder.at(f"{self.prefix}{name}({shown})")
+        self.recorder.at(f"{self.spelled(name)}({shown})")
         return int(self.function(name)(self.handle, *arguments))
 
     def do(self, name: str, *arguments: Any, shown: str = "", may_discard: bool = False) -> None:
@@ -127,28 +133,18 @@ class Library:
         if status not in (OK, WARNING) and self.lenient:
             raise Refused
         if status == DISCARD and may_discard:
-            text = f"{self.prefix}{name} discards: the rest of this experiment is left out ({self.said()})."
+            text = f"{self.spelled(name)} discards: the rest of this experiment is left out ({self.said()})."
             self.recorder.find("note", "run.discard", text)
             raise Refused
-        self._require(name, status, shown)
+        self.require(name, status, shown)
 
-    def _require(self, name: str, status: int, shown: str = "") -> None:
+    def require(self, name: str, status: int, shown: str = "") -> None:
+        """Stop the experiment if a call was refused."""
         if status not in (OK, WARNING):
             raise self.recorder.stop(
                 "run.refused",
-                f"{self.prefix}{name}({shown}) returns {self.status(status)} in a legal call: {self.said()}.",
+                f"{self.spelled(name)}({shown}) returns {self.status(status)} in a legal call: {self.said()}.",
             )
-
-    def trial_derivatives(self, size: int) -> list[float] | None:
-        """Return the state derivatives at a point that an integrator tries; None where the FMU discards it."""
-        array = (c.c_double * max(size, 1))()
-        if size:
-            name = "GetDerivatives" if self.prefix == "fmi2" else "GetContinuousStateDerivatives"
-            status = self.call(name, array, c.c_size_t(size))
-            if status == DISCARD:
-                return None
-            self._require(name, status)
-        return list(array)[:size]
 
     def said(self) -> str:
         """Return the last message of the FMU."""

@@ -83,7 +83,7 @@ def state(fmu: Any, recorder: Recorder) -> None:
 def token(fmu: Any, recorder: Recorder) -> None:
     """A wrong token is refused."""
     if fmu.instantiate(fmu.plan["token"] + "-wrong"):
-        name = "GUID" if fmu.prefix == "fmi2" else "instantiation token"
+        name = "GUID" if fmu.major == 2 else "instantiation token"
         recorder.find(
             "error",
             "run.token",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from fmu.standard.value_types import start_value
 from fmu.validate.child.calls import Recorder, Refused, Variable
 from fmu.validate.child.runs import instantiate
 
@@ -37,7 +38,7 @@ def start_values(fmu: Any, recorder: Recorder) -> None:
 def _compare_all(fmu: Any, recorder: Recorder, entries: list[list[Any]]) -> None:
     for entry in entries:
         variable = Variable(*entry)
-        expected = [_number(variable.type, text) for text in variable.start or ()]
+        expected = [start_value(variable.type, text) for text in variable.start or ()]
         found = fmu.get(variable)[0]
         expected = expected * len(found) if len(expected) == 1 else expected
         for position, (value, other) in enumerate(zip(expected, found, strict=False), 1):
@@ -52,14 +53,6 @@ def _compare_all(fmu: Any, recorder: Recorder, entries: list[list[Any]]) -> None
                     STARTS,
                 )
                 break
-
-
-def _number(kind: str, text: str) -> Any:
-    if kind == "Boolean":
-        return text in ("true", "1")
-    if kind == "Real" or kind.startswith("Float"):
-        return float(text.replace("INF", "inf"))
-    return int(text)
 
 
 def _equal(kind: str, expected: Any, found: Any) -> bool:

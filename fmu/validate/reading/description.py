@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from lxml import etree
 
 from fmu.standard.capabilities import Capability
+from fmu.standard.value_types import FLOATS
 
 KINDS = ("CoSimulation", "ModelExchange", "ScheduledExecution")
-FLOATS = ("Real", "Float32", "Float64")
-INTEGERS = ("Integer", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Enumeration")
 
 
 @dataclass(frozen=True)

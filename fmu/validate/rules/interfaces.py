@@ -74,7 +74,7 @@ def _flags(description: Description, kind: str, flags: Mapping[str, str]) -> Ite
 
 
 def _number(text: str | None) -> float | None:
-    return None if text is None else float(text.replace("INF", "inf"))
+    return None if text is None else float(text)
 
 
 def _experiment(experiment: Mapping[str, str]) -> Iterator[Finding]:

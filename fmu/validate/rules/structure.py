@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from fmu.standard.value_types import FLOATS
 from fmu.validate.findings import Finding, error, quoted, warning
-from fmu.validate.reading.description import FLOATS, Description, Unknown, Variable
+from fmu.validate.reading.description import Description, Unknown, Variable
 
 STRUCTURE = "FMI 2.0.4 section 2.2.8; FMI 3.0.2 section 2.4.8"
 _TITLES = {

@@ -6,8 +6,9 @@ import math
 import re
 from collections.abc import Iterator
 
+from fmu.standard.value_types import FLOATS, INTEGERS
 from fmu.validate.findings import Finding, error, quoted, warning
-from fmu.validate.reading.description import FLOATS, INTEGERS, Description, Variable
+from fmu.validate.reading.description import Description, Variable
 
 ATTRIBUTES = "FMI 2.0.4 section 2.2.7; FMI 3.0.2 section 2.4.7"
 NAMES = "FMI 2.0.4 section 2.2.9; FMI 3.0.2 section 2.4.7.5.1"
@@ -94,7 +95,7 @@ def _numbers(variable: Variable, texts: tuple[str, ...]) -> list[float] | None:
     if variable.type not in (*FLOATS, *INTEGERS):
         return []
     try:
-        return [float(text.replace("INF", "inf")) for text in texts]
+        return [float(text) for text in texts]
     except ValueError:
         return None
 

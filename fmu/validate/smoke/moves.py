@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from fmu.validate.reading.description import FLOATS, Description, Unknown, Variable
+from fmu.standard.value_types import FLOATS
+from fmu.validate.reading.description import Description, Unknown, Variable
 from fmu.validate.smoke.plan import entry, is_smooth_scalar
 
 _UNKNOWNS, _KNOWNS, _ELEMENTS = 100, 100, 100

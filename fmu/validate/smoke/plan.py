@@ -133,16 +133,12 @@ def is_smooth_scalar(variable: Variable) -> bool:
 
 def _times(description: Description, attributes: Any) -> tuple[float, float, float, int]:
     """Return start, stop, step and number of communication points."""
-    given = {
-        name: float(text.replace("INF", "inf"))
-        for name, text in description.experiment.items()
-        if name.endswith(("Time", "Size"))
-    }
+    given = {name: float(text) for name, text in description.experiment.items() if name.endswith(("Time", "Size"))}
     start = given.get("startTime", 0.0)
     stop = given.get("stopTime", start + 1.0)
     if not (math.isfinite(start) and math.isfinite(stop) and stop > start):
         start, stop = 0.0, 1.0
-    fixed = float(attributes.get("fixedInternalStepSize", "nan").replace("INF", "inf"))
+    fixed = float(attributes.get("fixedInternalStepSize", "nan"))
     step = given.get("stepSize", fixed if math.isfinite(fixed) else (stop - start) / 20.0)
     if not 0.0 < step <= stop - start:
         step = (stop - start) / 20.0
