@@ -77,12 +77,13 @@ def simulate(
         automaton, t_start=t_start, t_stop=t_end, inputs=Inputs(Layout(automaton), inputs), solver=solver, zeno=zeno
     )
     recording = Recording(execution.t, execution.j, execution.x, execution.z, execution.inputs.held)
+    # Lines 2 to 5 of the algorithm in docs/semantics.md.
     while execution.stopped is None:
         index = execution.due()
         if index is not None:
             recording.jumped(execution.jump(index))
         elif execution.t >= t_end and execution.in_flow_set():
-            execution.stopped, execution.message = Stop.HORIZON, f"{automaton.name}: reached t = {t_end:.9g} s."
+            execution.stop(Stop.HORIZON, f"reached t = {t_end:.9g} s.")
         else:
             recording.flowed(execution.flow(t_end))
     read = ComputedValues(automaton, execution.inputs)

@@ -40,7 +40,8 @@ class Solver(ExplainedCall):
     max_step : float
         Longest step in s.
     scan_points : int
-        Samples of every margin in a step, in whole eights; see `hybrid_model.reference.locate` for what that bounds.
+        Samples of every margin in a step, in whole eights; `hybrid_model.reference.zero_crossings` says what that
+        bounds.
     event_tolerance : float, optional
         In s: crossings closer than this are taken at one instant, in the fixed order of the jumps. The same number, in
         the margin's unit, is how far outside the flow set rounding may leave a state. Default: both follow from the

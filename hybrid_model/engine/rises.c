@@ -4,7 +4,7 @@
    Bernstein coefficients that enclose it, and Chebyshev coefficients whose tail tells how well it
    represents the margin.  Both together exclude a rise, or show that the margin is monotone so that
    the ends of the piece decide, or the piece is halved and its first half looked at first.  The
-   decisions are those of hybrid_model/reference/locate.py. */
+   decisions are those of hybrid_model/reference/zero_crossings.py. */
 #include <math.h>
 
 #include "search.h"

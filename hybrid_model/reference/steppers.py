@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,10 @@ from hybrid_model.declare.layout import not_finite
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import HybridModelError, SimulationError
 from hybrid_model.record.flow_piece import FlowPiece, straight_piece
-from hybrid_model.reference.borders import reach, step_from
-from hybrid_model.reference.locate import SMALLEST
+from hybrid_model.reference.point import Point
+from hybrid_model.reference.tolerances import reach, step_from
+from hybrid_model.reference.zero_crossings import SMALLEST
 from hybrid_model.scales import ABSOLUTE, UNKNOWN, tolerance_sizes, ulp
-
-if TYPE_CHECKING:
-    from hybrid_model.reference.execution import Execution
 
 SHORTEST = 16.0
 """Pieces shorter than this many ulp of t are made in one explicit Euler step: no stepper can subdivide them."""
@@ -42,13 +40,13 @@ class FlowMap:
     A stepper may try a point outside the flow set and come back with a shorter step, so one such value is no error yet.
     """
 
-    def __init__(self, execution: Execution, end: float) -> None:
-        self._execution = execution
+    def __init__(self, point: Point, end: float) -> None:
+        self._point = point
         # Inputs are continuous from the right: the last stage of a step that ends at a breakpoint belongs to the left.
-        self._last = float(np.nextafter(end, -np.inf)) if execution.inputs.vary else end
+        self._last = float(np.nextafter(end, -np.inf)) if point.inputs.vary else end
         # This is the innermost loop of a run: what does not change along a flow is looked up once.
-        self._rates, self._z, self._p = execution.maps.rates, execution.z, execution.p
-        self._held = None if execution.inputs.vary else execution.inputs.at(execution.t)
+        self._rates, self._z, self._p = point.maps.rates, point.z, point.p
+        self._held = None if point.inputs.vary else point.inputs.at(point.t)
         self.forget()
 
     def forget(self) -> None:
@@ -58,9 +56,9 @@ class FlowMap:
 
     def __call__(self, t: float, x: FloatArray) -> FloatArray:
         """Return dx/dt; not a number where the map cannot be evaluated."""
-        execution = self._execution
+        point = self._point
         t = min(t, self._last)
-        u = execution.inputs.at(t) if self._held is None else self._held
+        u = point.inputs.at(t) if self._held is None else self._held
         try:
             rates = self._rates(t, x, self._z, u, self._p)
         except HybridModelError:
@@ -71,30 +69,30 @@ class FlowMap:
             rates = np.full(x.shape, np.nan)
         # A sum is finite if its terms are, but for an overflow.
         if not self.trouble and not math.isfinite(rates.sum()) and not np.isfinite(rates).all():
-            self.trouble = f"derivative of {not_finite(execution.layout, Kind.STATE, rates)} at t = {t:.9g} s"
+            self.trouble = f"derivative of {not_finite(point.layout, Kind.STATE, rates)} at t = {t:.9g} s"
         if self.trouble:
             self._count += 1
             if self._count > ATTEMPTS * (1 + rates.size):
-                raise SimulationError(_failure(execution, self, t, x, None))
+                raise SimulationError(_failure(point, self, t, x, None))
         return rates
 
 
-def steps(execution: Execution, end: float) -> Any:
-    """Yield the steps of the flow from the execution's state to `end`."""
-    options = execution.solver
-    if execution.x.size == 0:
-        yield from _stateless_steps(execution, end)
+def steps(point: Point, end: float) -> Any:
+    """Yield the steps of the flow from the point to `end`."""
+    options = point.solver
+    if point.x.size == 0:
+        yield from _stateless_steps(point, end)
         return
-    flow_map = FlowMap(execution, end)
+    flow_map = FlowMap(point, end)
     # Not left to the steppers: with a first derivative that is not a number some of them never return.
-    flow_map(execution.t, execution.x)
+    flow_map(point.t, point.x)
     if flow_map.trouble:
-        raise SimulationError(_failure(execution, flow_map, execution.t, execution.x, None))
-    if execution.t == execution.t_start or execution.sizes.max() == 0.0:
-        _raise_floor(execution, end)
-    first = min(execution.next_step or step_from(execution, end), options.max_step, end - execution.t)
-    stepper = _stepper(execution, flow_map, end, first)
-    pace = Pace(execution, end)
+        raise SimulationError(_failure(point, flow_map, point.t, point.x, None))
+    if point.t == point.t_start or point.sizes.max() == 0.0:
+        _raise_floor(point, end)
+    first = min(point.next_step or step_from(point, end), options.max_step, end - point.t)
+    stepper = _stepper(point, flow_map, end, first)
+    pace = Pace(point, end)
     while stepper.status == "running":
         t0, x0 = stepper.t, stepper.y
         flow_map.forget()
@@ -106,30 +104,30 @@ def steps(execution: Execution, end: float) -> Any:
             # The linear algebra of the implicit methods refuses what is not finite.
             first = 0.1 * getattr(stepper, "h_abs", 0.0)
             if not first > SHORTEST * ulp(t0):
-                raise StuckError(_failure(execution, flow_map, t0, x0, str(error))) from error
-            stepper = _stepper(execution, flow_map, end, first)
+                raise StuckError(_failure(point, flow_map, t0, x0, str(error))) from error
+            stepper = _stepper(point, flow_map, end, first)
             continue
         # LSODA calls a step done that went nowhere.
         if stepper.status == "failed" or not stepper.t > t0:
-            if not flow_map.trouble and _raise_floor(execution, end):
-                stepper = _stepper(execution, flow_map, end, min(step_from(execution, end), options.max_step))
+            if not flow_map.trouble and _raise_floor(point, end):
+                stepper = _stepper(point, flow_map, end, min(step_from(point, end), options.max_step))
                 continue
             kind = StuckError if flow_map.trouble else SimulationError
-            raise kind(_failure(execution, flow_map, t0, x0, problem or "the step length fell to zero"))
-        execution.next_step = getattr(stepper, "h_abs", None)
+            raise kind(_failure(point, flow_map, t0, x0, problem or "the step length fell to zero"))
+        point.propose_step(getattr(stepper, "h_abs", None))
         yield FlowPiece(t0, stepper.t, x0, stepper.y, stepper.dense_output())
-        stepper.atol = _absolute_tolerance(execution, 0.0)
+        stepper.atol = _absolute_tolerance(point, 0.0)
         pace.check(stepper.t)
 
 
-def _stepper(execution: Execution, flow_map: FlowMap, end: float, first: float) -> Any:
-    """Return SciPy's stepper at the execution's state."""
-    options = execution.solver
-    atol = _absolute_tolerance(execution, first * float(np.abs(flow_map(execution.t, execution.x)).max()))
+def _stepper(point: Point, flow_map: FlowMap, end: float, first: float) -> Any:
+    """Return SciPy's stepper at the point."""
+    options = point.solver
+    atol = _absolute_tolerance(point, first * float(np.abs(flow_map(point.t, point.x)).max()))
     return options.stepper(
         flow_map,
-        execution.t,
-        execution.x,
+        point.t,
+        point.x,
         end,
         rtol=options.rtol,
         atol=atol,
@@ -138,36 +136,36 @@ def _stepper(execution: Execution, flow_map: FlowMap, end: float, first: float) 
     )
 
 
-def _raise_floor(execution: Execution, end: float) -> bool:
+def _raise_floor(point: Point, end: float) -> bool:
     """Give states that are far below where the flow may lead a size of that; return whether they got one."""
-    found = reach(execution, end)
-    if not max(float(execution.sizes.max()), execution.floor) < UNKNOWN * found:
+    found = reach(point, end)
+    if not max(float(point.sizes.max()), point.floor) < UNKNOWN * found:
         return False
-    execution.floor = found
+    point.raise_floor(found)
     return True
 
 
-def _absolute_tolerance(execution: Execution, first_reach: float) -> FloatArray:
+def _absolute_tolerance(point: Point, first_reach: float) -> FloatArray:
     """Return the absolute tolerance of each state: a part of its nominal value, else of its usual size.
 
     `first_reach` is how far the first step leads: states that start at zero have no size yet.
     """
-    if execution.solver.atol is not None:
-        return np.full(execution.x.shape, execution.solver.atol)
-    sizes = execution.sizes
+    if point.solver.atol is not None:
+        return np.full(point.x.shape, point.solver.atol)
+    sizes = point.sizes
     if first_reach > sizes.max():
         sizes = np.maximum(sizes, first_reach)
-    sizes = np.maximum(sizes, execution.floor)
+    sizes = np.maximum(sizes, point.floor)
     usual = tolerance_sizes(np.maximum(sizes, SMALLEST / ABSOLUTE))
-    return ABSOLUTE * np.where(np.isnan(execution.nominal), usual, execution.nominal)
+    return ABSOLUTE * np.where(np.isnan(point.nominal), usual, point.nominal)
 
 
 class Pace:
     """Gives up a flow that would take for ever: a stepper that creeps does not fail by itself."""
 
-    def __init__(self, execution: Execution, end: float) -> None:
-        self._execution, self._end = execution, end
-        self._t, self._steps = execution.t, 0
+    def __init__(self, point: Point, end: float) -> None:
+        self._point, self._end = point, end
+        self._t, self._steps = point.t, 0
 
     def check(self, t: float) -> None:
         """Count a step that ends at `t` in s."""
@@ -176,10 +174,10 @@ class Pace:
             return
         needed = (self._end - t) / (t - self._t) * PACE_STEPS
         if needed > MOST_STEPS:
-            execution = self._execution
-            state = execution.layout.describe({Kind.STATE: execution.x, Kind.DISCRETE: execution.z})
+            point = self._point
+            state = point.layout.describe({Kind.STATE: point.x, Kind.DISCRETE: point.z})
             raise SimulationError(
-                f"{execution.automaton.name}: the flow creeps: its last {PACE_STEPS} steps led from t = {self._t:.9g} "
+                f"{point.automaton.name}: the flow creeps: its last {PACE_STEPS} steps led from t = {self._t:.9g} "
                 f"to {t:.9g} s ({state}), so that it would need {needed:.2g} more to reach {self._end:.9g} s. Look for "
                 "a flow map that is not smooth there (a root at zero, a sign): write it as modes with a switch, or "
                 "smooth it; for a stiff flow choose Radau or BDF, and looser tolerances."
@@ -187,30 +185,21 @@ class Pace:
         self._t = t
 
 
-def _stateless_steps(execution: Execution, end: float) -> Any:
-    step = min(execution.solver.max_step, (end - execution.t) / STATELESS_STEPS)
-    times = np.linspace(execution.t, end, int(np.ceil((end - execution.t) / step)) + 1)
+def _stateless_steps(point: Point, end: float) -> Any:
+    step = min(point.solver.max_step, (end - point.t) / STATELESS_STEPS)
+    times = np.linspace(point.t, end, int(np.ceil((end - point.t) / step)) + 1)
     for t0, t1 in itertools.pairwise(times):
-        yield straight_piece(float(t0), float(t1), execution.x, execution.x)
+        yield straight_piece(float(t0), float(t1), point.x, point.x)
 
 
-def _failure(execution: Execution, flow_map: FlowMap, t: float, x: FloatArray, problem: str | None) -> str:
+def _failure(point: Point, flow_map: FlowMap, t: float, x: FloatArray, problem: str | None) -> str:
     why = (
         f"no step meets the tolerances ({str(problem).rstrip('.')}); where the flow map jumps, let a jump or a time "
         "event happen, and where an input jumps, give it as a Signal with its breakpoints"
     )
     if flow_map.trouble:
         why = f"{flow_map.trouble}; the flow map must give finite numbers in the flow set"
-        if execution.automaton.has_flow_set or execution.guards:
+        if point.automaton.has_flow_set or point.guards:
             why += ", and trial steps look a little outside: np.maximum(h, 0) under a root keeps it defined there"
-    state = execution.layout.describe({Kind.STATE: x, Kind.DISCRETE: execution.z})
-    return f"{execution.automaton.name}: the flow cannot go on at t = {t:.9g} s ({state}): {why}."
-
-
-def move(execution: Execution, piece: FlowPiece) -> FlowPiece:
-    """Bring an execution to the end of a piece, which must be finite."""
-    bad = not_finite(execution.layout, Kind.STATE, piece.x1)
-    if bad:
-        raise SimulationError(f"{execution.automaton.name}: {bad} at t = {piece.t1:.9g} s: states must stay finite.")
-    execution.arrive(piece.t1, piece.x1)
-    return piece
+    state = point.layout.describe({Kind.STATE: x, Kind.DISCRETE: point.z})
+    return f"{point.automaton.name}: the flow cannot go on at t = {t:.9g} s ({state}): {why}."

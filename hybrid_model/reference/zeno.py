@@ -136,13 +136,13 @@ class ZenoMonitor:
         self.guard = guard
         self._histories: dict[str, _History] = {}
 
-    def record(self, automaton: str, jump: str, t: float, *, on_state: bool = True) -> str | None:
+    def record(self, jump: str, t: float, *, on_state: bool = True) -> str | None:
         """Count a jump at time `t`.
 
         Parameters
         ----------
-        automaton, jump : str
-            Names, for the message.
+        jump : str
+            Its name.
         t : float
             Time in s.
         on_state : bool
@@ -157,11 +157,10 @@ class ZenoMonitor:
         history.add(t, self.guard.jumps_in_window)
         if history.at_once > self.guard.jumps_at_once:
             remedy = _STILL_ENABLED if on_state else _STILL_DUE
-            return f"{automaton}: {history.at_once} jumps of {jump!r} at one instant, t = {t:.9g} s: {remedy}"
+            return f"{history.at_once} jumps of {jump!r} at one instant, t = {t:.9g} s: {remedy}"
         if not on_state:
             return None
-        why = self._geometric(jump, history, t) or self._crowded(jump, history, t)
-        return why and f"{automaton}: {why}"
+        return self._geometric(jump, history, t) or self._crowded(jump, history, t)
 
     def _geometric(self, jump: str, history: _History, t: float) -> str | None:
         shrinking = history.shrinking(self.guard.spread)

@@ -7,8 +7,8 @@ from typing import Any
 from hybrid_model.declare.variables import Kind
 from hybrid_model.errors import SchedulingError
 from hybrid_model.record.recording import Recording
-from hybrid_model.reference.borders import instant
 from hybrid_model.reference.execution import Execution
+from hybrid_model.reference.tolerances import instant
 from hybrid_model.schedule.blocks import Block, Step, Termination, Update
 from hybrid_model.schedule.predicted_run import PredictedRun, take_internal
 from hybrid_model.stop import Stop
@@ -75,9 +75,7 @@ class AutomatonBlock(Block):
             changed = run.inputs.hold_parameter(index, value)
             run.tune()
         else:
-            vector = {Kind.STATE: run.x, Kind.DISCRETE: run.z}[kind]
-            changed = bool(vector[index] != value)
-            vector[index] = value
+            changed = run.put(kind, index, value)
         if changed:
             self._ahead = None
 

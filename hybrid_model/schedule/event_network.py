@@ -180,10 +180,11 @@ def _start(run: Execution, values: Values, given: Mapping[str, InputValue]) -> N
     for variable in run.automaton.of_kind(Kind.INPUT):
         if variable.name not in given:
             run.inputs.hold(variable.name, values[variable.name])
-    run.x, run.z = (
+    x, z = (
         layout.pack(kind, {place.variable.name: values[place.variable.name] for place in layout.places[kind]})
         for kind in (Kind.STATE, Kind.DISCRETE)
     )
+    run.begin_at(x, z)
 
 
 def _result(

@@ -14,7 +14,7 @@ from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
 from fmu.build.binaries import own_files
-from hybrid_model.reference.locate import HALVINGS, POINTS, TO_BERNSTEIN, TO_TAIL
+from hybrid_model.reference.zero_crossings import HALVINGS, POINTS, TO_BERNSTEIN, TO_TAIL
 
 EXECUTIONS = pytest.mark.parametrize("execution", ["python", "in process", "fmu"])
 BELOW = 1e-12

@@ -9,8 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hybrid_model as hm
-import hybrid_model.reference.locate
-from hybrid_model.reference.locate import DEGREE, first_nonnegative, may_rise, scan_times, ulp
+from hybrid_model.reference import zero_crossings
+from hybrid_model.reference.zero_crossings import DEGREE, first_nonnegative, may_rise, scan_times, ulp
 
 
 def first_rise(margin, a, b, panels=1):
@@ -18,7 +18,7 @@ def first_rise(margin, a, b, panels=1):
     for start, end in itertools.pairwise(np.linspace(a, b, panels + 1)):
         times = scan_times(start, end)
         samples = np.array([margin(t) for t in times])
-        bracket = hybrid_model.reference.locate.first_rise(times, samples, lambda at: np.array([margin(t) for t in at]))
+        bracket = zero_crossings.first_rise(times, samples, lambda at: np.array([margin(t) for t in at]))
         if bracket is not None:
             assert may_rise(samples[:, None])[0]
             return first_nonnegative(margin, *bracket)
