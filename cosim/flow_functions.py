@@ -18,16 +18,14 @@ from xml.etree import ElementTree
 import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Model
-from fmpy.fmi3 import FMU3Model
 
 from fmu.archives.reading import Archive
-from fmu.importer.callbacks import Callbacks
-from fmu.importer.loading import load_binary, read_description
+from fmu.importer.instance import FmuInstance
+from fmu.importer.loading import major_of, read_description
 from fmu.importer.temporary_folders import temporary_folder
 from fmu.importer.unpacking import unpack
 from fmu.importer.values import exact
-from fmu.standard.value_types import accessor
+from fmu.standard.capabilities import Capability
 
 FloatArray = npt.NDArray[np.float64]
 MAX_ITERATIONS = 1000
@@ -86,21 +84,22 @@ class FlowFunctions:
         try:
             with Archive(path) as archive:
                 description = read_description(path)
-                if description.modelExchange is None or description.fmiVersion == "1.0":
+                if description.modelExchange is None or major_of(description) is None:
                     raise FlowError("it has no Model Exchange of FMI 2.0 or 3.0")
                 folder = temporary_folder()
                 weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
                 unpack(archive, folder)
-                self._provides_derivatives = _provides_derivatives(archive.read("modelDescription.xml"))
+                self._provides_derivatives = _provides_derivatives(
+                    archive.read("modelDescription.xml"), major_of(description) or 0
+                )
             self._begin(description, folder, dict(start or {}), t_start)
         except Exception as error:
             raise FlowError(f"{path} cannot be run: {error}") from error
 
     def derivatives(self, t: float, x: npt.ArrayLike, u: npt.ArrayLike = ()) -> FloatArray:
         """Return dx/dt, shape (n,), at time t in s, states x (n,) and inputs u (m,)."""
-        get = self._fmu.getDerivatives if self._fmi2 else self._fmu.getContinuousStateDerivatives
         with self._at(t, x, u):
-            get(self._buffer, len(self.states))
+            self._instance.call("GetContinuousStateDerivatives", self._buffer, len(self.states))
         return np.array(self._buffer[: len(self.states)])
 
     def values(self, t: float, x: npt.ArrayLike, u: npt.ArrayLike = ()) -> FloatArray:
@@ -131,8 +130,6 @@ class FlowFunctions:
 
     def _begin(self, description: Any, folder: Path, start: dict[str, float], t_start: float) -> None:
         self.name = str(description.modelName)
-        self._fmi2 = description.fmiVersion == "2.0"
-        interface = description.modelExchange
         variables = description.modelVariables
         self._rates = [unknown.variable for unknown in description.derivatives]
         self._x = [variable.derivative for variable in self._rates]
@@ -146,16 +143,11 @@ class FlowFunctions:
             for group in (self._x, self._u, self._outputs)
         )
         self._buffer = (ctypes.c_double * max(len(self.states), 1))()
-        token = description.guid if self._fmi2 else description.instantiationToken
-        self._fmu = load_binary(
-            FMU2Model if self._fmi2 else FMU3Model,
-            folder,
-            2 if self._fmi2 else 3,
-            guid=token,
-            modelIdentifier=interface.modelIdentifier,
-            instanceName=self.name,
-        )
-        self._end = weakref.finalize(self, _free, self._fmu, self._instantiate())
+        # Messages are dropped: fmpy tells by an exception which function failed.
+        self._instance = FmuInstance(description, folder, self.name, lambda status, message: None, "ModelExchange")
+        self._fmu = self._instance.fmu
+        self._instance.instantiate()
+        self._end = weakref.finalize(self, _free, self._instance)
         known = {variable.name: variable for variable in variables}
         for name, value in start.items():
             if name not in known:
@@ -165,29 +157,11 @@ class FlowFunctions:
         self._fmu.getContinuousStates(self._buffer, len(self.states))
         self.x, self.u = np.array(self._buffer[: len(self.states)]), self._get(self._u)
 
-    def _instantiate(self) -> Callbacks | None:
-        # Messages are dropped: fmpy tells by an exception which function failed.
-        if not self._fmi2:
-            self._fmu.instantiate(logMessage=lambda environment, status, category, message: None)
-            return None
-        callbacks = Callbacks(lambda status, message: None, self.name)
-        try:
-            self._fmu.instantiate(callbacks=callbacks.functions)
-        except Exception:
-            callbacks.release()
-            raise
-        return callbacks
-
     def _initialize(self, t_start: float) -> None:
-        if self._fmi2:
-            self._fmu.setupExperiment(startTime=t_start)
-            self._fmu.enterInitializationMode()
-        else:
-            self._fmu.enterInitializationMode(startTime=t_start)
+        self._instance.enter_initialization(t_start)
         self._fmu.exitInitializationMode()
-        update = self._fmu.newDiscreteStates if self._fmi2 else self._fmu.updateDiscreteStates
         for _ in range(MAX_ITERATIONS):
-            again, terminate, *_ = update()
+            again, terminate, _ = self._instance.update()
             if terminate:
                 raise FlowError("it ends its run at the start")
             if not again:
@@ -221,32 +195,28 @@ class FlowFunctions:
     def _get(self, variables: list[Any]) -> FloatArray:
         values: list[float] = []
         for variable in variables:
-            size = () if self._fmi2 else (_size(variable),)
-            values += getattr(self._fmu, f"get{variable.type}")([variable.valueReference], *size)
+            get, arguments = self._instance.getter(variable, _size(variable))
+            values += get(*arguments)
         return np.array(values, dtype=np.float64)
 
     def _set(self, variable: Any, values: list[float]) -> None:
-        numbers = [exact(variable, value, str(variable.name)) for value in values]
-        getattr(self._fmu, f"set{accessor(variable.type, 2 if self._fmi2 else 3)}")([variable.valueReference], numbers)
+        self._instance.set(variable, [exact(variable, value, str(variable.name)) for value in values])
 
     def _sensitivity(self, unknowns: list[Any], known: Any, place: int) -> list[float]:
         references = [variable.valueReference for variable in unknowns]
         seed = [float(k == place) for k in range(_size(known))]
-        size = () if self._fmi2 else (sum(map(_size, unknowns)),)
-        return list(self._fmu.getDirectionalDerivative(references, [known.valueReference], seed, *size))
+        return self._instance.slopes(references, known.valueReference, seed, sum(map(_size, unknowns)))
 
 
-def _free(fmu: Any, callbacks: Callbacks | None) -> None:
-    fmu.freeInstance()
-    if callbacks is not None:
-        callbacks.release()
+def _free(instance: FmuInstance) -> None:
+    instance.free()
+    instance.fmu.freeLibrary()
 
 
-def _provides_derivatives(description: bytes) -> bool:
-    # fmpy does not know the name that the flag has in FMI 3.0.
+def _provides_derivatives(description: bytes, major: int) -> bool:
+    # fmpy does not know the name that the capability has in FMI 3.0.
     interface = ElementTree.fromstring(description).find("ModelExchange")
-    names = ("providesDirectionalDerivative", "providesDirectionalDerivatives")
-    return interface is not None and any(interface.get(name) in ("true", "1") for name in names)
+    return interface is not None and Capability.DIRECTIONAL_DERIVATIVES.claimed(interface.attrib, major)
 
 
 def _size(variable: Any) -> int:

@@ -10,9 +10,9 @@ from cosim.errors import CosimError, MisfitError
 from cosim.instances.access import FmuAccess
 from cosim.instances.calls import FmuCalls
 from cosim.instances.fmu_file import FmuFile
-from cosim.instances.instance import FmuInstance
 from cosim.instances.variables import STRUCTURAL, FmuVariables
 from cosim.slave import Slave
+from fmu.importer.instance import FmuInstance
 from fmu.importer.values import UnfitError, Value, exact, parsed, require_within
 from hybrid_model.scales import ROUNDINGS
 from hybrid_model.schedule.blocks import Step, Update
@@ -131,16 +131,16 @@ class FmuSlave(Slave):
 
     def begin(self) -> None:
         """See `Slave.begin`."""
-        self._calls(self._instance.exit_initialization)
+        self._calls(self._instance.call, "ExitInitializationMode")
         self._begun = True
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
-        self._calls(self._instance.enter_event_mode)
+        self._calls(self._instance.call, "EnterEventMode")
 
     def enter_step_mode(self) -> None:
         """See `Slave.enter_step_mode`."""
-        self._calls(self._instance.enter_step_mode)
+        self._calls(self._instance.call, "EnterStepMode")
 
     def update(self) -> Update:
         """See `Slave.update`."""

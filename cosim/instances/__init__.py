@@ -1,4 +1,4 @@
-"""One instance of anybody's FMU: its file, its functions in both versions of the standard, access to its values.
+"""An FMU behind a slave: its file, its scalars by name, access to their values, and what it says in calls.
 
-It imports `fmu.importer` and `fmu.archives`; slaves are made on it.
+It imports `fmu.importer`, `fmu.archives` and `fmu.standard`; slaves are made on it.
 """

@@ -7,8 +7,8 @@ from typing import Any
 
 from cosim.errors import CosimError
 from cosim.instances.calls import FmuCalls
-from cosim.instances.instance import FmuInstance
 from cosim.instances.variables import STRUCTURAL, FmuVariables
+from fmu.importer.instance import FmuInstance
 
 
 class FmuAccess:
@@ -36,10 +36,10 @@ class FmuAccess:
         """Write start values; structural parameters first, in the mode that FMI 3.0 has for them."""
         structural = [name for name in values if self._variables.places[name][0].causality == STRUCTURAL]
         if structural:
-            self._calls(self.instance.enter_configuration)
+            self._calls(self.instance.call, "EnterConfigurationMode")
             for name in structural:
                 self.write(name, values[name])
-            self._calls(self.instance.exit_configuration)
+            self._calls(self.instance.call, "ExitConfigurationMode")
         for name, value in values.items():
             if name not in structural:
                 self.write(name, value)

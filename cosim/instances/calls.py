@@ -10,6 +10,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import fmi3Fatal, fmi3OK, fmi3Warning
 
 from cosim.errors import CosimError
+from fmu.importer.instance import VersionError
 from hybrid_model.schedule.blocks import Termination
 
 MESSAGES = 100
@@ -45,7 +46,7 @@ class FmuCalls:
         Raises
         ------
         CosimError
-            If the FMU answers with an error, with the last message of this call.
+            If the FMU answers with an error, with the last message of this call, or does not have the function.
         """
         self._messages.clear()
         try:
@@ -53,6 +54,8 @@ class FmuCalls:
         except FMICallException as error:
             self.fatal = self.fatal or error.status == fmi3Fatal
             raise CosimError(f"{self._name}: {error.function} failed: {self.said}") from error
+        except VersionError as error:
+            raise CosimError(str(error)) from error
 
     @property
     def said(self) -> str:

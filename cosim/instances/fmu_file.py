@@ -12,11 +12,9 @@ from typing import Any
 from fmpy.model_description import ValidationError
 
 from cosim.errors import CosimError
-from cosim.instances.fmi2 import Fmi2Instance
-from cosim.instances.fmi3 import Fmi3Instance
-from cosim.instances.instance import FmuInstance
 from fmu.archives.reading import Archive
-from fmu.importer.loading import read_description
+from fmu.importer.instance import FmuInstance
+from fmu.importer.loading import major_of, read_description
 from fmu.importer.temporary_folders import temporary_folder
 from fmu.importer.unpacking import unpack
 
@@ -58,13 +56,12 @@ class FmuFile:
             ) from error
         except Exception as error:
             raise CosimError(f"{name}: {path} cannot be read as an FMU: {error}") from error
-        kind = _kind(self.description)
-        if kind is None or self.description.coSimulation is None:
+        if major_of(self.description) is None or self.description.coSimulation is None:
             raise CosimError(
                 f"{name}: {path} is not an FMI 2.0 or 3.0 Co-Simulation FMU (it says FMI "
                 f"{self.description.fmiVersion}, {_interfaces(self.description)}): export it as one."
             )
-        self._name, self._path, self._kind = name, path, kind
+        self._name, self._path = name, path
         self._loaded: FmuInstance | None = None
         experiment = self.description.defaultExperiment
         self.start_time, self.stop_time, self.step = (
@@ -121,18 +118,12 @@ class FmuFile:
             try:
                 with Archive(self._path) as archive:
                     unpack(archive, folder)
-                self._loaded = self._kind(self.description, folder, self._name, hear)
+                self._loaded = FmuInstance(self.description, folder, self._name, hear)
             except Exception as error:
                 shutil.rmtree(folder, ignore_errors=True)
                 raise CosimError(f"{self._name}: {self._path} cannot be loaded on this machine: {error}") from error
             weakref.finalize(self, _unload, self._loaded.fmu, folder)
         return self._loaded
-
-
-def _kind(description: Any) -> type[FmuInstance] | None:
-    if description.fmiVersion == "2.0":
-        return Fmi2Instance
-    return Fmi3Instance if description.fmiVersion.startswith("3.") else None
 
 
 def _interfaces(description: Any) -> str:

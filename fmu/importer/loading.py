@@ -39,6 +39,12 @@ def read_description(path: str | Path, *, validate: bool = True) -> Any:
         return read_model_description(str(path), validate=validate)
 
 
+def major_of(description: Any) -> int | None:
+    """Return the version of the standard, 2 or 3, of a description; None for any other."""
+    version = str(description.fmiVersion)
+    return 2 if version == "2.0" else 3 if version.startswith("3.") else None
+
+
 def load_binary(make: Callable[..., Fmu], folder: Path, major: int, **arguments: Any) -> Fmu:
     """Return an object of fmpy with the FMU's binary loaded.
 

@@ -1,0 +1,190 @@
+"""One instance of anybody's FMU in this process, over fmpy: one set of methods for both versions of the standard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2Discard, fmi2LastSuccessfulTime, fmi2Terminated
+from fmpy.fmi3 import FMU3Model, FMU3Slave
+
+from fmu.importer.callbacks import Callbacks
+from fmu.importer.loading import load_binary, major_of
+from fmu.standard.functions import spelled
+from fmu.standard.value_types import accessor
+
+Getter = tuple[Callable[..., list[Any]], tuple[Any, ...]]
+"""A function of fmpy, and the arguments with which it returns all elements of one variable."""
+_CLASSES = {
+    (2, "CoSimulation"): FMU2Slave,
+    (2, "ModelExchange"): FMU2Model,
+    (3, "CoSimulation"): FMU3Slave,
+    (3, "ModelExchange"): FMU3Model,
+}
+
+
+class VersionError(ValueError):
+    """An FMU is asked for a function that its version of the standard does not have."""
+
+
+class Advance(NamedTuple):
+    """What one call of DoStep gave.
+
+    Attributes
+    ----------
+    reached : float
+        Time in s that the FMU is at.
+    event : bool
+        Whether it asks for event mode.
+    terminate : bool
+        Whether it ends the run.
+    early : bool
+        Whether it returned before the end of the step.
+    """
+
+    reached: float
+    event: bool
+    terminate: bool
+    early: bool
+
+
+class FmuInstance:
+    """An FMU whose binary is loaded; at most one instance of it at a time.
+
+    Methods raise fmpy's ``FMICallException`` when the FMU answers with an error, `VersionError` for what FMI 2.0 does
+    not have, or whatever fmpy raises when it cannot be loaded or instantiated.
+
+    Parameters
+    ----------
+    description : fmpy.model_description.ModelDescription
+        Of an FMU of FMI 2.0 or 3.0.
+    folder : Path
+        The FMU, unpacked.
+    name : str
+        Of the instance.
+    log : callable
+        Told the status and the text of each message of the FMU.
+    kind : {"CoSimulation", "ModelExchange"}
+        Interface type, one that the FMU has.
+
+    Attributes
+    ----------
+    fmu : object of fmpy
+    """
+
+    def __init__(
+        self, description: Any, folder: Path, name: str, log: Callable[[int, str], None], kind: str = "CoSimulation"
+    ) -> None:
+        self.name, self._log, self._kind = name, log, kind
+        self.major = major_of(description) or 0
+        interface = description.coSimulation if kind == "CoSimulation" else description.modelExchange
+        self.fmu = load_binary(
+            _CLASSES[self.major, kind],
+            folder,
+            self.major,
+            guid=description.guid if self.major == 2 else description.instantiationToken,
+            modelIdentifier=interface.modelIdentifier,
+            instanceName=name,
+        )
+        self._callbacks: Callbacks | None = None
+
+    def function(self, name: str) -> Callable[..., Any]:
+        """Return what calls a function, which goes by its name of FMI 3.0 without prefix."""
+        plain = spelled(self.major, name).removeprefix(f"fmi{self.major}")
+        found: Callable[..., Any] | None = getattr(self.fmu, plain[0].lower() + plain[1:], None)
+        if found is None:
+            raise VersionError(f"{self.name} is an FMU of FMI {self.major}.0 for {self._kind}, which has no {name}.")
+        return found
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Call a function."""
+        return self.function(name)(*arguments)
+
+    def instantiate(self, events: bool = False) -> None:
+        """Make the instance; `events` says whether the master handles events, as FMI 3.0 has it."""
+        if self.major == 3:
+            modes = {"eventModeUsed": events, "earlyReturnAllowed": events} if self._kind == "CoSimulation" else {}
+            self.fmu.instantiate(logMessage=self._heard, **modes)
+            return
+        self._callbacks = Callbacks(self._log, self.name)
+        try:
+            self.fmu.instantiate(callbacks=self._callbacks.functions)
+        except Exception:
+            self._callbacks.release()
+            raise
+
+    def _heard(self, environment: Any, status: int, category: Any, message: bytes | None) -> None:
+        self._log(status, (message or b"").decode("utf-8", "replace"))
+
+    def enter_initialization(self, t_start: float, t_stop: float | None = None) -> None:
+        """Enter initialization mode; times in s."""
+        if self.major == 2:
+            self.fmu.setupExperiment(startTime=t_start, stopTime=t_stop)
+            self.fmu.enterInitializationMode()
+        else:
+            self.fmu.enterInitializationMode(startTime=t_start, stopTime=t_stop)
+
+    def getter(self, variable: Any, size: int) -> Getter:
+        """Return what reads a variable of `size` elements."""
+        found = self.function(f"Get{accessor(variable.type, self.major)}")
+        return found, ([variable.valueReference], *(() if self.major == 2 else (size,)))
+
+    def set(self, variable: Any, values: Sequence[Any]) -> None:
+        """Write all elements of a variable."""
+        self.call(f"Set{accessor(variable.type, self.major)}", [variable.valueReference], values)
+
+    def step(self, t: float, size: float) -> Advance:
+        """Step from `t` towards `t + size`; an FMU of FMI 2.0 may end it early, with fmi2Discard."""
+        if self.major == 3:
+            event, terminate, early, reached = self.fmu.doStep(t, size)
+            return Advance(reached, event, terminate, early)
+        try:
+            self.fmu.doStep(t, size)
+        except FMICallException as error:
+            if error.status != fmi2Discard:
+                raise
+            ended = self._status(self.fmu.getBooleanStatus, fmi2Terminated, False)
+            return Advance(self._status(self.fmu.getRealStatus, fmi2LastSuccessfulTime, t), False, ended, True)
+        return Advance(t + size, False, False, False)
+
+    @staticmethod
+    def _status(ask: Callable[[int], Any], kind: int, otherwise: Any) -> Any:
+        """Return what an FMU says of a discarded step; many have no answer."""
+        try:
+            return ask(kind)
+        except FMICallException:
+            return otherwise
+
+    def update(self) -> tuple[bool, bool, float | None]:
+        """Do one event iteration; return whether it needs one more, whether it ends the run, the next event's time."""
+        again, terminate, _, _, defined, time = self.call("UpdateDiscreteStates")
+        return again, terminate, time if defined else None
+
+    def ticks(self, references: Sequence[int]) -> list[bool]:
+        """Return which clocks tick."""
+        return list(self.call("GetClock", references))
+
+    def slopes(self, unknowns: Sequence[int], known: int, seed: Sequence[float], size: int) -> list[float]:
+        """Return the directional derivatives, `size` in all, of variables by one variable along a seed."""
+        more = () if self.major == 2 else (size,)
+        return list(self.fmu.getDirectionalDerivative(unknowns, [known], seed, *more))
+
+    def save(self) -> Any:
+        """Return the state."""
+        return self.call("GetFMUState")
+
+    def restore(self, state: Any) -> None:
+        """Return to a state."""
+        self.call("SetFMUState", state)
+
+    def release(self, state: Any) -> None:
+        """Free a state."""
+        self.call("FreeFMUState", state)
+
+    def free(self) -> None:
+        """Free the instance; the binary stays loaded."""
+        getattr(self.fmu, spelled(self.major, "FreeInstance"))(self.fmu.component)
+        if self._callbacks is not None:
+            self._callbacks.release()
