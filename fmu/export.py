@@ -11,7 +11,7 @@ from pathlib import Path
 from fmu.archives.writing import check_target, package
 from fmu.build.archive_members import archive_members
 from fmu.build.binaries import binaries, fmi_headers, own_files, runtime_sources
-from fmu.build.model_code import model_code
+from fmu.build.fmu_code import fmu_code
 from fmu.build.source_files import source_names
 from fmu.describe.description import Description, model_identifier
 from fmu.describe.variables import Fmi, fmu_variables
@@ -94,7 +94,7 @@ def export_fmu(
     variables = fmu_variables(traced, version, clocks=clocks)
     runtime = runtime_sources(version.value)
 
-    code = model_code(traced, variables, _TOKEN, chosen)
+    code = fmu_code(traced, variables, _TOKEN, chosen)
     listed = tuple(source_names(version)) if sources else ()
     description = Description(traced, variables, _TOKEN, version, chosen, stop_time, step_size, listed)
     # A run of a large network in Python takes longer than all else together.

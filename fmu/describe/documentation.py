@@ -177,9 +177,7 @@ def _jumps(description: Description) -> list[str]:
 def _clocks(description: Description) -> list[str]:
     jumps = description.automaton.jumps
     shown = [(k, v) for k, v in enumerate(description.variables) if v.bank is Bank.CLOCK]
-    rows = [
-        (description.names[k], jumps[description.automaton.clocks[v.index].jump].name, v.description) for k, v in shown
-    ]
+    rows = [(description.names[k], jumps[v.index].name, v.description) for k, v in shown]
     return ["<h2>Clocks</h2>", *_table(("clock", "ticks with jump", "description"), rows)] if rows else []
 
 

@@ -202,11 +202,10 @@ class _Maps:
         if variable.bank is Bank.INDICATOR:
             return [("margins", index, 1) if index < len(self.margins) else ("flow_set", 0, 1)]
         if variable.bank is Bank.CLOCK:
-            jump = automaton.clocks[index].jump
-            if jump not in self.margins:
+            if index not in self.margins:
                 return [("t", 0, 1)]
             waits = automaton.priority is Priority.FLOW and automaton.has_flow_set
-            return [("margins", self.margins[jump], 1), *([("flow_set", 0, 1)] if waits else [])]
+            return [("margins", self.margins[index], 1), *([("flow_set", 0, 1)] if waits else [])]
         return []
 
 

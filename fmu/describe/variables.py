@@ -34,7 +34,7 @@ class Fmi(enum.Enum):
 
 
 class Bank(enum.Enum):
-    """What a variable shows; the value is the name in hybrid_model/engine/model.h."""
+    """What a variable shows; the value is the name in fmu/interface/description.h."""
 
     TIME = "BANK_TIME"
     STATE = "BANK_STATE"
@@ -51,7 +51,7 @@ class Bank(enum.Enum):
 
 
 class FmiType(enum.Enum):
-    """Types of variables; the value is the name in hybrid_model/engine/model.h."""
+    """Types of variables; the value is the name in fmu/interface/description.h."""
 
     FLOAT64 = "TYPE_FLOAT64"
     INT32 = "TYPE_INT32"
@@ -80,7 +80,7 @@ class FmuVariable:
     type : FmiType
         Type in the FMU.
     bank, index : Bank, int
-        Vector of the engine and place of the first element in it.
+        Vector of the engine and place of the first element in it; of a clock the jump that it ticks with.
     causality, variability, initial : str
         As in the FMI standard 3.0, section 2.4.7.
     start : tuple of float or None
@@ -295,9 +295,9 @@ def _margins(automaton: Automaton) -> Iterator[FmuVariable]:
 
 
 def _clocks(automaton: Automaton, layout: Layout) -> Iterator[FmuVariable]:
-    for index, clock in enumerate(automaton.clocks):
+    for clock in automaton.clocks:
         yield FmuVariable(
-            clock.name, FmiType.CLOCK, Bank.CLOCK, index, "output", "discrete", description=clock.description
+            clock.name, FmiType.CLOCK, Bank.CLOCK, clock.jump, "output", "discrete", description=clock.description
         )
     if predicts_events(automaton, layout):
         text = "counts down to the next event, as far as it can be foretold"

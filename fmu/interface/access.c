@@ -9,7 +9,7 @@ static const char *type_name(Type type)
     return NAMES[type];
 }
 
-static bool may_be_set(const ModelVariable *variable, int mode)
+static bool may_be_set(const Variable *variable, int mode)
 {
     bool before_start = (mode & (MODE_INSTANTIATED | MODE_INITIALIZATION)) != 0;
     switch (variable->bank) {
@@ -28,21 +28,21 @@ static bool may_be_set(const ModelVariable *variable, int mode)
     }
 }
 
-const ModelVariable *find_variable(const Instance *instance, const char *function, Reference reference)
+const Variable *find_variable(const Instance *instance, const char *function, Reference reference)
 {
-    if (reference < model.n_variables)
-        return &model.variables[reference];
+    if (reference < description.n_variables)
+        return &description.variables[reference];
     refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name, function,
            (unsigned long)reference);
     return NULL;
 }
 
-Answer check_type(const Instance *instance, const char *function, const ModelVariable *variable, Type type)
+Answer check_type(const Instance *instance, const char *function, const Variable *variable, Type type)
 {
     if (variable->type == type)
         return ANSWER_OK;
     return refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.", instance->name,
-                  function, NAME_AT(&model, variable->name), type_name((Type)variable->type));
+                  function, NAME_OF(variable), type_name((Type)variable->type));
 }
 
 /* Checks the arguments of a getter or setter before anything is written. */
@@ -53,12 +53,12 @@ static Answer check_access(const Instance *instance, const char *function, Type 
     if (n > 0 && (!references || !values))
         return null_argument(instance, function);
     for (size_t i = 0; i < n; i++) {
-        const ModelVariable *variable = find_variable(instance, function, references[i]);
+        const Variable *variable = find_variable(instance, function, references[i]);
         if (!variable || check_type(instance, function, variable, type) != ANSWER_OK)
             return ANSWER_ERROR;
         if (set && !may_be_set(variable, instance->run->mode))
             return refuse(instance, "%s: %s: '%s' cannot be set in the state '%s'.", instance->name, function,
-                          NAME_AT(&model, variable->name), mode_name(instance->run->mode));
+                          NAME_OF(variable), mode_name(instance->run->mode));
         needed += variable->size;
     }
     if (n_values != needed)
@@ -76,7 +76,7 @@ View view_now(const Instance *instance)
 }
 
 /* The values of a variable's bank from its first element on; NULL (and one log line) if there are none. */
-static const double *elements(const Instance *instance, const ModelVariable *variable, double *own)
+static const double *elements(const Instance *instance, const Variable *variable, double *own)
 {
     const Run *run = instance->run;
     switch (variable->bank) {
@@ -85,21 +85,21 @@ static const double *elements(const Instance *instance, const ModelVariable *var
     case BANK_OPTION: *own = run->stop_at_events; return own;
     default: break;
     }
-    const double *values = engine_values(instance->engine, view_now(instance), variable->bank);
+    const double *values = engine_values(instance->engine, view_now(instance), (Bank)variable->bank);
     if (values)
         return values + variable->index;
-    refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, NAME_AT(&model, variable->name),
+    refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, NAME_OF(variable),
            engine_problem(instance->engine));
     return NULL;
 }
 
-static bool fits(const ModelVariable *variable, double value)
+static bool fits(const Variable *variable, double value)
 {
     return isfinite(value) && (variable->type != TYPE_INT32 || fabs(value + 0.5) <= 2147483647.5);
 }
 
 /* Reads the elements of a variable; with no `store` it only checks that they can be read. */
-static Answer read_variable(const Instance *instance, const ModelVariable *variable, void *values, size_t at,
+static Answer read_variable(const Instance *instance, const Variable *variable, void *values, size_t at,
                             StoreValue *store)
 {
     double own;
@@ -111,7 +111,7 @@ static Answer read_variable(const Instance *instance, const ModelVariable *varia
         if (!fits(variable, value))
             return refuse(instance, "%s: '%s' is %g at t = %.17g, which a value of type %s must not be. Remedy: check "
                           "its expression, the parameters and the inputs.",
-                          instance->name, NAME_AT(&model, variable->name), from[k], instance->run->time,
+                          instance->name, NAME_OF(variable), from[k], instance->run->time,
                           type_name((Type)variable->type));
         if (store)
             store(values, at + k, value);
@@ -126,31 +126,31 @@ Answer instance_get(void *handle, const char *function, Type type, const Referen
     if (!instance || check_access(instance, function, type, false, references, n, values, n_values) != ANSWER_OK)
         return ANSWER_ERROR;
     for (size_t i = 0; i < n; i++)
-        if (read_variable(instance, &model.variables[references[i]], NULL, 0, NULL) != ANSWER_OK)
+        if (read_variable(instance, &description.variables[references[i]], NULL, 0, NULL) != ANSWER_OK)
             return ANSWER_ERROR;
-    for (size_t i = 0, at = 0; i < n; at += model.variables[references[i]].size, i++)
-        read_variable(instance, &model.variables[references[i]], values, at, store);
+    for (size_t i = 0, at = 0; i < n; at += description.variables[references[i]].size, i++)
+        read_variable(instance, &description.variables[references[i]], values, at, store);
     return ANSWER_OK;
 }
 
-static Answer check_value(const Instance *instance, const char *function, const ModelVariable *variable, double value)
+static Answer check_value(const Instance *instance, const char *function, const Variable *variable, double value)
 {
     if (!isfinite(value))
         return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, value,
-                      NAME_AT(&model, variable->name));
+                      NAME_OF(variable));
     if (variable->bank == BANK_SIZE && value != (double)variable->index)
         return refuse(instance, "%s: %s: the length '%s' is %lu in this FMU and cannot become %.0f. Remedy: export the "
-                      "model with that length.", instance->name, function, NAME_AT(&model, variable->name),
+                      "model with that length.", instance->name, function, NAME_OF(variable),
                       (unsigned long)variable->index, value);
     return ANSWER_OK;
 }
 
-static void write_element(Instance *instance, const ModelVariable *variable, size_t k, double value)
+static void write_element(Instance *instance, const Variable *variable, size_t k, double value)
 {
     if (variable->bank == BANK_OPTION)
         instance->run->stop_at_events = value != 0.0;
     else if (variable->bank != BANK_SIZE)
-        engine_set(instance->engine, variable->bank, variable->index + k, value);
+        engine_set(instance->engine, (Bank)variable->bank, variable->index + k, value);
 }
 
 Answer instance_set(void *handle, const char *function, Type type, const Reference references[], size_t n,
@@ -160,12 +160,12 @@ Answer instance_set(void *handle, const char *function, Type type, const Referen
     if (!instance || check_access(instance, function, type, true, references, n, values, n_values) != ANSWER_OK)
         return ANSWER_ERROR;
     for (size_t i = 0, at = 0; i < n; i++)
-        for (size_t k = 0; k < model.variables[references[i]].size; k++)
-            if (check_value(instance, function, &model.variables[references[i]], load(values, at++)) != ANSWER_OK)
+        for (size_t k = 0; k < description.variables[references[i]].size; k++)
+            if (check_value(instance, function, &description.variables[references[i]], load(values, at++)) != ANSWER_OK)
                 return ANSWER_ERROR;
     for (size_t i = 0, at = 0; i < n; i++)
-        for (size_t k = 0; k < model.variables[references[i]].size; k++)
-            write_element(instance, &model.variables[references[i]], k, load(values, at++));
+        for (size_t k = 0; k < description.variables[references[i]].size; k++)
+            write_element(instance, &description.variables[references[i]], k, load(values, at++));
     return ANSWER_OK;
 }
 

@@ -9,7 +9,7 @@ static Answer check_clocks(const Instance *instance, const char *function, const
     if (n > 0 && (!references || !values))
         return null_argument(instance, function);
     for (size_t i = 0; i < n; i++) {
-        const ModelVariable *variable = find_variable(instance, function, references[i]);
+        const Variable *variable = find_variable(instance, function, references[i]);
         if (!variable || check_type(instance, function, variable, TYPE_CLOCK) != ANSWER_OK)
             return ANSWER_ERROR;
     }
@@ -22,9 +22,9 @@ static Answer check_countdowns(const Instance *instance, const char *function, c
     if (check_clocks(instance, function, references, n, values) != ANSWER_OK)
         return ANSWER_ERROR;
     for (size_t i = 0; i < n; i++)
-        if (model.variables[references[i]].bank != BANK_COUNTDOWN)
+        if (description.variables[references[i]].bank != BANK_COUNTDOWN)
             return refuse(instance, "%s: %s: '%s' is an output clock, which ticks by itself.", instance->name,
-                          function, NAME_AT(&model, model.variables[references[i]].name));
+                          function, NAME_OF(&description.variables[references[i]]));
     return ANSWER_OK;
 }
 
@@ -38,10 +38,10 @@ Answer instance_get_clocks(void *handle, const char *function, const Reference r
     bool in_event_mode = instance->run->mode == MODE_EVENT;
     size_t pending = in_event_mode ? engine_pending(instance->engine) : model.n_jumps;
     for (size_t i = 0; i < n; i++) {
-        const ModelVariable *clock = &model.variables[references[i]];
+        const Variable *clock = &description.variables[references[i]];
         bool pends = pending < model.n_jumps;
         if (clock->bank == BANK_CLOCK)
-            pends = (pends && model.clock_jump[clock->index] == pending) ||
+            pends = (pends && clock->index == pending) ||
                     (in_event_mode && engine_ticked(instance->engine, clock->index));
         active[i] = pends;
     }

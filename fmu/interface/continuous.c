@@ -33,7 +33,7 @@ Answer instance_set_states(void *handle, const char *function, const double x[],
     for (size_t i = 0; i < n; i++)
         if (!isfinite(x[i]))
             return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, x[i],
-                          NAME_AT(&model, model.state_names[i]));
+                          NAME_AT(model.names, model.state_names[i]));
     engine_set_states(instance->engine, x);
     return ANSWER_OK;
 }
@@ -66,7 +66,7 @@ Answer instance_get_vector(void *handle, const char *function, Bank bank, double
         if (!isfinite(from[i])) {
             bool margin = bank == BANK_INDICATOR;
             const char *name = margin && i == model.n_margins ? "flow set"
-                                                              : NAME_AT(&model, margin ? model.margin_names[i]
+                                                              : NAME_AT(model.names, margin ? model.margin_names[i]
                                                                                        : model.state_names[i]);
             refuse(instance, "%s: %s: the value for '%s' is %g at t = %.17g, which is not finite. Remedy: a smaller "
                    "step, or other parameters and inputs.",

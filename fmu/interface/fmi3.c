@@ -63,7 +63,7 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
         return NULL;
     }
     for (size_t i = 0; i < nRequiredIntermediateVariables; i++)
-        if (requiredIntermediateVariables[i] >= model.n_variables) {
+        if (requiredIntermediateVariables[i] >= description.n_variables) {
             refuse(&made.base, "%s: there is no variable with the value reference %lu.", __func__,
                    (unsigned long)requiredIntermediateVariables[i]);
             return NULL;

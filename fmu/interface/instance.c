@@ -74,7 +74,7 @@ static void log_jump(void *context, double time, size_t jump)
     if (!instance->log_line || !instance->logging || !(instance->categories & LOG_EVENTS))
         return;
     snprintf(message, sizeof message, "%s: '%s' jumps at t = %.17g.", instance->name,
-             NAME_AT(&model, model.jumps[jump].name), time);
+             NAME_AT(model.names, model.jumps[jump].name), time);
     end_text_cleanly(message);
     instance->log_line(instance, ANSWER_OK, EVENT_CATEGORY, message);
 }
@@ -130,12 +130,12 @@ Instance *instance_new(const Instance *prototype, size_t size, const char *funct
         refuse(prototype, "%s: the instance name is missing; it needs at least one visible character.", function);
         return NULL;
     }
-    if (!token || strcmp(token, model.token) != 0) {
+    if (!token || strcmp(token, description.token) != 0) {
         refuse(prototype, "%s: %s: the instantiation token '%s' is not this FMU's '%s'. Remedy: use the "
-               "modelDescription.xml of the same FMU.", name, function, token ? token : "(null)", model.token);
+               "modelDescription.xml of the same FMU.", name, function, token ? token : "(null)", description.token);
         return NULL;
     }
-    if (prototype->interface == CO_SIMULATION ? !model.co_simulation : !model.model_exchange) {
+    if (prototype->interface == CO_SIMULATION ? !description.co_simulation : !description.model_exchange) {
         refuse(prototype, "%s: %s: this FMU is not for %s.", name, function, kind);
         return NULL;
     }

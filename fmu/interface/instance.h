@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-#include "engine.h"
+#include "description.h"
 
 #if defined(__GNUC__)
 #pragma GCC visibility push(hidden)
@@ -100,8 +100,8 @@ typedef void StoreValue(void *values, size_t i, double value);
 typedef double LoadValue(const void *values, size_t i);
 
 /* The variable of a value reference; NULL (and one log line) if there is none. */
-const ModelVariable *find_variable(const Instance *instance, const char *function, Reference reference);
-Answer check_type(const Instance *instance, const char *function, const ModelVariable *variable, Type type);
+const Variable *find_variable(const Instance *instance, const char *function, Reference reference);
+Answer check_type(const Instance *instance, const char *function, const Variable *variable, Type type);
 /* All or nothing: a value that cannot be had, or must not be set, leaves everything as it was. */
 Answer instance_get(void *handle, const char *function, Type type, const Reference references[], size_t n,
                     void *values, size_t n_values, StoreValue *store);

@@ -4,7 +4,7 @@
 #include "instance.h"
 
 /* Where a variable's derivatives lie; N_SEEDS if it is none that has any there. */
-static int place_of(const ModelVariable *variable, bool known)
+static int place_of(const Variable *variable, bool known)
 {
     switch (variable->bank) {
     case BANK_TIME: return known ? SEED_TIME : N_SEEDS;
@@ -25,12 +25,12 @@ static Answer check_direction(const Instance *instance, const char *function, co
     if (direction->n > 0 && (!direction->references || !values))
         return null_argument(instance, function);
     for (size_t i = 0; i < direction->n; i++) {
-        const ModelVariable *variable = find_variable(instance, function, direction->references[i]);
+        const Variable *variable = find_variable(instance, function, direction->references[i]);
         if (!variable)
             return ANSWER_ERROR;
         if (variable->type != TYPE_FLOAT64 || place_of(variable, known) == N_SEEDS)
             return refuse(instance, "%s: %s: '%s' is none of the %s that derivatives are of.", instance->name,
-                          function, NAME_AT(&model, variable->name), known ? "knowns" : "unknowns");
+                          function, NAME_OF(variable), known ? "knowns" : "unknowns");
         needed += variable->size;
     }
     if (direction->n_values != needed)
@@ -47,7 +47,7 @@ static Answer check_direction(const Instance *instance, const char *function, co
 static void scatter(const Direction *direction, bool known, double *const places[N_SEEDS])
 {
     for (size_t i = 0, at = 0; i < direction->n; i++) {
-        const ModelVariable *variable = &model.variables[direction->references[i]];
+        const Variable *variable = &description.variables[direction->references[i]];
         for (size_t k = 0; k < variable->size; k++)
             places[place_of(variable, known)][variable->index + k] += direction->seeds[at++];
     }
@@ -56,7 +56,7 @@ static void scatter(const Direction *direction, bool known, double *const places
 static void gather(const Direction *direction, bool known, double *const places[N_SEEDS])
 {
     for (size_t i = 0, at = 0; i < direction->n; i++) {
-        const ModelVariable *variable = &model.variables[direction->references[i]];
+        const Variable *variable = &description.variables[direction->references[i]];
         for (size_t k = 0; k < variable->size; k++)
             direction->results[at++] = places[place_of(variable, known)][variable->index + k];
     }
@@ -66,7 +66,7 @@ static void gather(const Direction *direction, bool known, double *const places[
 static bool all_finite(const Direction *direction, bool known, double *const places[N_SEEDS])
 {
     for (size_t i = 0; i < direction->n; i++) {
-        const ModelVariable *variable = &model.variables[direction->references[i]];
+        const Variable *variable = &description.variables[direction->references[i]];
         for (size_t k = 0; k < variable->size; k++)
             if (!isfinite(places[place_of(variable, known)][variable->index + k]))
                 return false;

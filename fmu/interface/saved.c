@@ -132,9 +132,9 @@ static uint64_t checksum(const unsigned char *bytes, size_t n)
 
 static void put_token(unsigned char *bytes)
 {
-    size_t size = strlen(model.token);
+    size_t size = strlen(description.token);
     memset(bytes, 0, TOKEN_SIZE);
-    memcpy(bytes, model.token, size < TOKEN_SIZE ? size : TOKEN_SIZE);
+    memcpy(bytes, description.token, size < TOKEN_SIZE ? size : TOKEN_SIZE);
 }
 
 Answer instance_serialized_size(void *handle, const char *function, const void *state, size_t *size)

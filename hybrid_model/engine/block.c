@@ -39,9 +39,9 @@ bool end_run(Engine *engine)
     return false;
 }
 
-const char *write_name(const Model *m, ModelName name, char text[NAME_SIZE])
+const char *engine_name(const char *names, ModelName name, char text[NAME_SIZE])
 {
-    snprintf(text, NAME_SIZE, "%s%s", m->names + name.head, m->names + name.tail);
+    snprintf(text, NAME_SIZE, "%s%s", names + name.head, names + name.tail);
     end_text_cleanly(text);
     return text;
 }
@@ -59,7 +59,7 @@ const char *describe_state(const Engine *engine, const double *x, const double *
     for (size_t i = 0; i < m->n_states + m->n_discrete && used + 1 < size; i++) {
         double value = i < m->n_states ? x[i] : z[i - m->n_states];
         int added = snprintf(text + used, size - used, "%s%s = %.10g", used ? ", " : "",
-                             NAME_AT(m, state_name(m, i)), value);
+                             NAME_AT(m->names, state_name(m, i)), value);
         used += added > 0 ? (size_t)added : 0;
     }
     end_text_cleanly(text);
@@ -115,7 +115,7 @@ static size_t lay_out_block(Engine *engine, unsigned char *memory)
     engine->u = take(&cursor, m->n_inputs * sizeof(double));
     engine->p = take(&cursor, m->n_parameters * sizeof(double));
     engine->history = take(&cursor, m->n_jumps * sizeof(JumpHistory));
-    engine->ticked = take(&cursor, m->n_clocks);
+    engine->ticked = take(&cursor, m->n_jumps);
     engine->inner_rates = take(&cursor, m->n_states * sizeof(double));
     for (size_t i = 0; i < N_SEGMENT; i++)
         engine->segment[i] = take(&cursor, m->n_states * sizeof(double));

@@ -21,7 +21,7 @@ static bool states_are_finite(Engine *engine, double t, const double *x)
             return problem(engine, ENDED_NOT_FINITE,
                            "'%s' does not stay finite up to t = %.17g. Remedy: check its derivative for 0/0 or the root "
                            "of a negative number; trial steps look a little outside the flow set.",
-                           NAME_AT(m, m->state_names[i]), t);
+                           NAME_AT(m->names, m->state_names[i]), t);
     return true;
 }
 

@@ -55,6 +55,11 @@ typedef enum {
     VIEW_PENDING                /* the state after the jump that comes next at this instant */
 } View;
 
+/* The vectors of a run that can be read; what is computed from the others begins with the outputs. */
+typedef enum {
+    BANK_STATE, BANK_DISCRETE, BANK_INPUT, BANK_PARAMETER, BANK_OUTPUT, BANK_DERIVATIVE, BANK_INDICATOR, N_BANKS
+} Bank;
+
 /* The importer's layer gets `wrapper_size` bytes of its own inside the block. */
 Engine *engine_create(const Model *model, size_t wrapper_size);
 void engine_free(Engine *engine);
@@ -130,8 +135,8 @@ bool engine_arrive(Engine *engine);
    that has gone too far, or came out by a jump, may find its way back. */
 bool engine_may_flow(Engine *engine);
 
-/* Clocks that ticked since engine_clear_ticks; engine_advance clears them when it begins. */
-bool engine_ticked(const Engine *engine, size_t clock);
+/* Visible jumps taken since engine_clear_ticks, with which clocks tick; engine_advance clears them when it begins. */
+bool engine_ticked(const Engine *engine, size_t jump);
 void engine_clear_ticks(Engine *engine);
 /* The target of the last engine_advance, nearer than the one asked for if the hook wanted that. */
 double engine_target(const Engine *engine);

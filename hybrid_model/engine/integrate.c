@@ -205,14 +205,14 @@ bool step_begin(Engine *engine, const Point *point)
             return problem(engine, ENDED_NOT_FINITE,
                            "The derivative of '%s' is %g at t = %.17g where '%s' = %.17g; derivatives must be finite. "
                            "Remedy: check the flow map and the parameters.",
-                           NAME_AT(m, m->state_names[i]), step->k[0][i], t, NAME_AT(m, m->state_names[i]),
+                           NAME_AT(m->names, m->state_names[i]), step->k[0][i], t, NAME_AT(m->names, m->state_names[i]),
                            point->x[i]);
     return true;
 }
 
 static bool step_too_small(Engine *engine, const Point *point, double h, bool finite)
 {
-    const char *name = NAME_AT(engine->model, engine->model->state_names[engine->suspect]);
+    const char *name = NAME_AT(engine->model->names, engine->model->state_names[engine->suspect]);
     double value = point->x[engine->suspect];
     if (!finite)
         return problem(engine, ENDED_NOT_FINITE,

@@ -5,14 +5,14 @@
 
 #include "parts.h"
 
-bool engine_ticked(const Engine *engine, size_t clock)
+bool engine_ticked(const Engine *engine, size_t jump)
 {
-    return engine->ticked[clock] != 0;
+    return engine->ticked[jump] != 0;
 }
 
 void engine_clear_ticks(Engine *engine)
 {
-    memset(engine->ticked, 0, engine->model->n_clocks);
+    memset(engine->ticked, 0, engine->model->n_jumps);
 }
 
 size_t engine_jumps_taken(const Engine *engine)
@@ -25,9 +25,9 @@ static bool refused(Engine *engine, Ending ending, size_t jump, size_t i, double
 {
     const Model *m = engine->model;
     bool starts = jump == m->n_jumps;
-    return problem(engine, ending, "'%s' becomes %.9g at t = %.17g by %s%s%s; %s", NAME_AT(m, state_name(m, i)),
+    return problem(engine, ending, "'%s' becomes %.9g at t = %.17g by %s%s%s; %s", NAME_AT(m->names, state_name(m, i)),
                    engine->reset.x[i], t, starts ? "its start value" : "the jump map of '",
-                   starts ? "" : NAME_AT(m, m->jumps[jump].name), starts ? "" : "'", rule);
+                   starts ? "" : NAME_AT(m->names, m->jumps[jump].name), starts ? "" : "'", rule);
 }
 
 bool accept_state(Engine *engine, size_t jump, const Point *point)
@@ -72,7 +72,7 @@ bool evaluate_times(Engine *engine, const Point *point)
             return problem(engine, ENDED_NOT_FINITE,
                            "The time of '%s' is not a number at t = %.17g; a time event needs a time (infinity: "
                            "never). Remedy: check its expression and the parameters.",
-                           NAME_AT(m, m->jumps[j].name), *point->time);
+                           NAME_AT(m->names, m->jumps[j].name), *point->time);
     return true;
 }
 
@@ -85,7 +85,7 @@ static bool moved_on(Engine *engine, size_t jump, double was, const Point *point
     return now > was || problem(engine, ENDED_FAILED,
                                 "The time event '%s' was due at %.17g s and after its jump is due at %.17g s. Remedy: "
                                 "let its jump map move its time on.",
-                                NAME_AT(engine->model, engine->model->jumps[jump].name), was, now);
+                                NAME_AT(engine->model->names, engine->model->jumps[jump].name), was, now);
 }
 
 bool apply_reset(Engine *engine, size_t jump, const Point *point)
@@ -94,7 +94,7 @@ bool apply_reset(Engine *engine, size_t jump, const Point *point)
     double was = entry->kind == JUMP_ON_TIME ? engine->times[entry->index] : 0.0;
     if (!evaluate_reset(engine, jump, point))
         return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
-                       NAME_AT(engine->model, entry->name), *point->time);
+                       NAME_AT(engine->model->names, entry->name), *point->time);
     return accept_state(engine, jump, point) &&
            (entry->kind == JUMP_ON_STATE || moved_on(engine, jump, was, point));
 }
@@ -178,13 +178,6 @@ bool first_enabled(Engine *engine, const Point *point, size_t *jump)
     return true;
 }
 
-static void tick(Engine *engine, size_t jump)
-{
-    for (size_t c = 0; c < engine->model->n_clocks; c++)
-        if (engine->model->clock_jump[c] == jump)
-            engine->ticked[c] = 1;
-}
-
 /* Counts a visible jump; false if there are too many. */
 static bool count_jump(Engine *engine, size_t jump)
 {
@@ -201,7 +194,7 @@ static bool take_jump(Engine *engine, size_t jump)
     if (engine->model->jumps[jump].kind == JUMP_ON_STATE)
         engine->live.level[engine->model->jumps[jump].index] = 0.0;
     engine->live.level[engine->model->n_margins] = 0.0;
-    tick(engine, jump);
+    engine->ticked[jump] = 1;
     if (engine->jump_hook)
         engine->jump_hook(engine->jump_context, *engine->live.time, jump);
     return count_jump(engine, jump) || end_run(engine);

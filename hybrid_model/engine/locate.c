@@ -219,7 +219,7 @@ static bool refuse_indicators(Engine *engine, const Search *search)
                            "The margin of %s'%s' is 0 or 1 along the flow up to t = %.17g, as if it said no or yes. "
                            "Remedy: return a number that is zero or above inside the set and negative outside.",
                            row == search->exit_row ? "the flow set of " : "jump ",
-                           row == search->exit_row ? m->name : NAME_AT(m, m->margin_names[row]), engine->step.t1);
+                           row == search->exit_row ? m->name : NAME_AT(m->names, m->margin_names[row]), engine->step.t1);
     }
     return true;
 }

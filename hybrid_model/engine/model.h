@@ -1,8 +1,7 @@
-/* What a generated model tells the engine.
+/* What a generated model tells the engine: mathematics, and names for messages.
 
-   The exporter writes one file, model.c, that defines `const Model model` and the
-   tables behind it.  Every expression in it is traced from the automaton's Python
-   declaration; nothing about a model is written by hand. */
+   hybrid_model/native writes the C of `const Model model` and of the tables behind it.  Every expression in it is
+   traced from the automaton's Python declaration; nothing about a model is written by hand. */
 #ifndef HYBRID_MODEL_H
 #define HYBRID_MODEL_H
 
@@ -41,26 +40,9 @@ typedef struct {
     bool internal;         /* a breakpoint of the flow (on time only): depends on t, z, p alone, invisible outside */
 } ModelJump;
 
-/* SIZE is the length of arrays, COUNTDOWN the clock of the next event, OPTION a switch of the interface. */
-typedef enum {
-    BANK_TIME, BANK_STATE, BANK_DISCRETE, BANK_INPUT, BANK_PARAMETER, BANK_OUTPUT, BANK_CLOCK,
-    BANK_DERIVATIVE, BANK_INDICATOR, BANK_SIZE, BANK_COUNTDOWN, BANK_OPTION
-} Bank;
-typedef enum { TYPE_FLOAT64, TYPE_INT32, TYPE_UINT64, TYPE_BOOLEAN, TYPE_CLOCK } Type;
-
-typedef struct {
-    ModelName name;
-    uint32_t index;        /* of its first element in its bank; of BANK_CLOCK the clock's, of BANK_SIZE the length */
-    uint32_t size;         /* number of its elements */
-    uint8_t type, bank;
-    bool discrete;         /* variability discrete (inputs, outputs) */
-    bool calculated;       /* its start value is computed by `start`, so it cannot be set */
-    bool tunable;          /* a parameter that may be set at events and communication points */
-} ModelVariable;
-
 #define N_REACH_AT 4
 /* The numbers of the semantics, none of which is in seconds or in the unit of a state: see
-   hybrid_model/scales.py, from which the exporter takes them. */
+   hybrid_model/scales.py, from which the generator takes them. */
 typedef struct {
     double roundings, instant, instant_in_gap, border, absolute, rounding_level, unknown, probe, overshoot;
     double jumps_at_once, jumps_in_window, accumulation, spread, crowd, resolved, chatter, pause;
@@ -69,11 +51,9 @@ typedef struct {
 
 typedef struct {
     const char *name;                  /* model name, for messages */
-    const char *token;                 /* instantiation token */
-    bool co_simulation, model_exchange;    /* the kinds that the description offers */
     size_t n_states, n_discrete, n_inputs, n_parameters, n_outputs;
     size_t n_margins, n_times;         /* jump margins (without the flow set's), times */
-    size_t n_jumps, n_clocks, n_variables;
+    size_t n_jumps;
     size_t n_arg, n_res, n_iw, n_w;    /* sizes of the work arrays that the functions need (maximum over all) */
     bool flow_priority;                /* flow wins where flow set and jump set overlap (default: jump) */
     bool has_flow_set;                 /* false: flow is allowed everywhere */
@@ -95,16 +75,14 @@ typedef struct {
        start_forward, start_reverse: the same of x0, z0 in place of dx/dt, y */
     ModelFunction forward, reverse, start_forward, start_reverse;
     const ModelJump *jumps;            /* in the fixed order in which simultaneous ones are taken */
-    const size_t *clock_jump;          /* n_clocks: the jump with which each clock ticks */
-    const ModelVariable *variables;    /* value reference = index in this table; 0 is the time */
     const ModelName *state_names, *discrete_names, *margin_names;
     const char *names;                 /* heads and tails one after the other, each with its end */
 } Model;
 
 /* A name as a text that lives as long as the block in which this stands. */
 #define NAME_SIZE 256
-#define NAME_AT(model, name) write_name((model), (name), (char[NAME_SIZE]){0})
-const char *write_name(const Model *m, ModelName name, char text[NAME_SIZE]);
+#define NAME_AT(names, name) engine_name((names), (name), (char[NAME_SIZE]){0})
+const char *engine_name(const char *names, ModelName name, char text[NAME_SIZE]);
 
 extern const Model model;
 

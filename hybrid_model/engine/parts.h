@@ -98,7 +98,7 @@ struct Engine {
     Point live, predicted;
     double *u, *p;
     JumpHistory *history;
-    unsigned char *ticked;
+    unsigned char *ticked;        /* by each jump */
     double *segment[N_SEGMENT];
     double *inner_rates;          /* noted for points outside the flow set */
     /* Scratch: nothing here outlives a call, except the cache of a view. */

@@ -24,7 +24,7 @@ bool evaluate_margins(Engine *engine, double t, const double *x, const double *z
             return problem(engine, ENDED_NOT_FINITE,
                            "The jump margin '%s' is not a number at t = %.17g; margins must be numbers. Remedy: check "
                            "the jump set for 0/0 or the root of a negative number.",
-                           NAME_AT(m, m->margin_names[i]), t);
+                           NAME_AT(m->names, m->margin_names[i]), t);
     return true;
 }
 

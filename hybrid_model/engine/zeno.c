@@ -73,7 +73,7 @@ static bool shrinking(const ModelScales *scales, const JumpHistory *history, dou
 bool too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t)
 {
     const ModelJump *entry = &engine->model->jumps[jump];
-    const char *name = NAME_AT(engine->model, entry->name);
+    const char *name = NAME_AT(engine->model->names, entry->name);
     if (entry->kind == JUMP_ON_TIME)
         return problem(engine, ENDED_ZENO,
                        "Zeno: %llu jumps of '%s' at one instant, t = %.10g s: its time is still not after the present. "
@@ -91,7 +91,7 @@ bool zeno_record(Engine *engine, size_t jump)
 {
     const ModelScales *scales = &engine->model->scales;
     JumpHistory *history = &engine->history[jump];
-    const char *name = NAME_AT(engine->model, engine->model->jumps[jump].name);
+    const char *name = NAME_AT(engine->model->names, engine->model->jumps[jump].name);
     double t = *engine->live.time, gap = 0.0, ratio = 0.0;
     remember(scales, history, t);
     unsigned long long total = history->total, burst = history->burst;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import casadi as ca
@@ -62,6 +62,11 @@ def boolean(value: bool) -> str:
 def row(*entries: object) -> str:
     """Return an initialiser of a struct."""
     return f"{{{', '.join(map(str, entries))}}}"
+
+
+def definition(kind: str, name: str, fields: Mapping[str, object]) -> str:
+    """Return the definition of a constant struct that other files see."""
+    return f"const {kind} {name} = {{\n" + "".join(f"    .{key} = {value},\n" for key, value in fields.items()) + "};\n"
 
 
 def array(kind: str, name: str, items: Iterable[str]) -> str:

@@ -17,7 +17,7 @@ from lxml import etree
 import hybrid_model as hm
 from fmu.archives.writing import package
 from fmu.build.archive_members import archive_members
-from fmu.build.model_code import model_code
+from fmu.build.fmu_code import fmu_code
 from fmu.build.source_files import source_names
 from fmu.describe.description import Description
 from fmu.describe.experiment import round_step
@@ -35,7 +35,7 @@ def content(automaton, fmi, *, sources=True, references=True, kinds=KINDS, **opt
     variables = fmu_variables(traced, fmi)
     listed = tuple(source_names(fmi)) if sources else ()
     description = Description(traced, variables, TOKEN, fmi, kinds, sources=listed, **options)
-    return archive_members(description, model_code(traced, variables, TOKEN, kinds), references=references)
+    return archive_members(description, fmu_code(traced, variables, TOKEN, kinds), references=references)
 
 
 @pytest.fixture(scope="module", params=BOTH, ids=lambda fmi: fmi.value)

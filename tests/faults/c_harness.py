@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files, runtime_sources
 from fmu.build.compiler import find_compiler
-from fmu.build.model_code import model_code
+from fmu.build.fmu_code import fmu_code
 from fmu.describe.variables import Fmi, fmu_variables
 from hybrid_model import Automaton
 from hybrid_model.native.trace import trace
@@ -44,7 +44,7 @@ def generated(automaton: Automaton, fmi: str) -> tuple[str, tuple]:
     """The model's C code, and its variables in the order of their references."""
     traced = trace(automaton)
     variables = fmu_variables(traced, Fmi(fmi))
-    return model_code(traced, variables, TOKEN, ("cs", "me")), variables
+    return fmu_code(traced, variables, TOKEN, ("cs", "me")), variables
 
 
 class Builder:

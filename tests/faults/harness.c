@@ -69,12 +69,12 @@ void heard(void *environment, int status, const char *category, const char *mess
 /* The values of all variables of a type but the clocks; the sum of their sizes. */
 static int read_type(void *instance, Type type, double *to, size_t *n)
 {
-    uint32_t *references = own_memory(model.n_variables * sizeof *references);
+    uint32_t *references = own_memory(description.n_variables * sizeof *references);
     size_t found = 0, size = 0;
-    for (size_t i = 0; i < model.n_variables; i++)
-        if (model.variables[i].type == type && size + model.variables[i].size <= MOST_VALUES - *n) {
+    for (size_t i = 0; i < description.n_variables; i++)
+        if (description.variables[i].type == type && size + description.variables[i].size <= MOST_VALUES - *n) {
             references[found++] = (uint32_t)i;
-            size += model.variables[i].size;
+            size += description.variables[i].size;
         }
     int status = found > 0 ? importer_access(instance, false, type, references, found, to + *n, size) : 0;
     *n += size;
@@ -178,12 +178,12 @@ static size_t read_values(void)
 
 static size_t size_of(uint32_t reference)
 {
-    return reference < model.n_variables ? model.variables[reference].size : 1;
+    return reference < description.n_variables ? description.variables[reference].size : 1;
 }
 
 static Type type_of(uint32_t reference)
 {
-    return reference < model.n_variables ? model.variables[reference].type : TYPE_FLOAT64;
+    return reference < description.n_variables ? description.variables[reference].type : TYPE_FLOAT64;
 }
 
 /* ---- calls ---- */
@@ -196,8 +196,8 @@ static void do_new(void)
     place->update = wish.update = (int)number();
     char *name = text();
     const char *given = word();
-    char *token = own_memory(strlen(given) + strlen(model.token) + 1);
-    strcpy(token, strcmp(given, "own") == 0 ? model.token : given);
+    char *token = own_memory(strlen(given) + strlen(description.token) + 1);
+    strcpy(token, strcmp(given, "own") == 0 ? description.token : given);
     wish.name = name;
     wish.token = strcmp(given, "none") == 0 ? NULL : token;
     place->looks = 0;
@@ -385,8 +385,8 @@ static void do_rates(void)
     void *own = instance();
     uint32_t references[64];
     size_t n = 0;
-    for (size_t i = 0; i < model.n_variables && n < 64; i++)
-        if (model.variables[i].bank == BANK_OUTPUT && model.variables[i].type == TYPE_FLOAT64)
+    for (size_t i = 0; i < description.n_variables && n < 64; i++)
+        if (description.variables[i].bank == BANK_OUTPUT && description.variables[i].type == TYPE_FLOAT64)
             references[n++] = (uint32_t)i;
     int status = importer_rates(own, references, n, values, n);
     tell_all(status, status == 0 ? n : 0);

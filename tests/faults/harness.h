@@ -10,7 +10,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#include "model.h"
+#include "description.h"
 
 /* Statuses have the same numbers in both versions.  Where a version has no such function: */
 enum { NO_SUCH_FUNCTION = -1, MOST_VALUES = 4096 };

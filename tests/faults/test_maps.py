@@ -14,9 +14,8 @@ from catalogue import cases
 from fmu.build.binaries import OWN_FOLDERS
 from fmu.build.compiler import find_compiler
 from fmu.build.libraries import COMMON_FLAGS
-from fmu.build.model_code import model_code
-from fmu.describe.variables import Fmi, fmu_variables
 from hybrid_model.declare.variables import Kind
+from hybrid_model.native.model_code import model_code
 from hybrid_model.native.trace import trace
 
 pytestmark = pytest.mark.faults
@@ -44,8 +43,7 @@ class Maps:
     """A model's maps, compiled as for an FMU."""
 
     def __init__(self, traced, folder):
-        code = model_code(traced, fmu_variables(traced, Fmi.V3_0), "0" * 32, ("cs",))
-        (folder / "model.c").write_text(code)
+        (folder / "model.c").write_text(model_code(traced))
         (folder / "hands_on.c").write_text(HANDS_ON)
         library = folder / "maps.so"
         flags = [flag for flag in COMMON_FLAGS if flag != "-fvisibility=hidden"]

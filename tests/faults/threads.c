@@ -33,9 +33,9 @@ static bool iterate(void *instance)
 
 static uint64_t watched(void *instance, uint64_t sum)
 {
-    for (uint32_t i = 0; i < model.n_variables; i++) {
+    for (uint32_t i = 0; i < description.n_variables; i++) {
         double value;
-        if (model.variables[i].type != TYPE_FLOAT64 || model.variables[i].size != 1)
+        if (description.variables[i].type != TYPE_FLOAT64 || description.variables[i].size != 1)
             continue;
         if (importer_access(instance, false, TYPE_FLOAT64, &i, 1, &value, 1) != 0)
             return 0;
@@ -47,7 +47,7 @@ static uint64_t watched(void *instance, uint64_t sum)
 static void *run(void *argument)
 {
     Task *task = argument;
-    const Wish wish = {.kind = "cs", .name = "thread", .token = model.token, .events = FMI_VERSION == 3,
+    const Wish wish = {.kind = "cs", .name = "thread", .token = description.token, .events = FMI_VERSION == 3,
                        .early = true, .logging = false, .listening = false, .update = 0};
     void *instance = importer_new(&wish, NULL), *state = NULL;
     uint64_t sum = 14695981039346656037u;

@@ -1,36 +1,27 @@
-"""Generate model.c: the traced functions and the tables that the engine reads (hybrid_model/engine/model.h)."""
+"""Generate the C of a model: the traced functions and tables that the engine reads (hybrid_model/engine/model.h)."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
-from fmu.describe.variables import FmuVariable
 from hybrid_model import scales
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.transitions import Priority, Trigger
 from hybrid_model.declare.variables import Kind
-from hybrid_model.native.c_text import array, boolean, constant, functions, row, string
+from hybrid_model.native.c_text import array, boolean, constant, definition, functions, row, string
 from hybrid_model.native.derivatives import derivative_functions
 from hybrid_model.native.names import NameTable
 from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.trace import Trace
 
 
-def model_code(
-    traced: Trace | NetworkTrace, variables: Sequence[FmuVariable], token: str, kinds: Collection[str]
-) -> str:
+def model_code(traced: Trace | NetworkTrace) -> str:
     """Return the C source of a model.
 
     Parameters
     ----------
     traced : Trace or NetworkTrace
         The automaton's maps.
-    variables : sequence of FmuVariable
-        In the order of their value references.
-    token : str
-        Instantiation token.
-    kinds : collection of str
-        ``"cs"``, ``"me"``: what the FMU offers.
 
     Returns
     -------
@@ -38,8 +29,7 @@ def model_code(
         A C99 translation unit that defines ``const Model model``.
     """
     maps, work = _maps(traced)
-    tables = [*_tables(traced, variables), _model(traced, variables, token, kinds, work)]
-    return "\n".join([_PRELUDE, maps, *tables])
+    return "\n".join([_PRELUDE, maps, *_tables(traced), _model(traced, work)])
 
 
 def _maps(traced: Trace | NetworkTrace) -> tuple[str, Sequence[int]]:
@@ -72,7 +62,7 @@ static int hybrid_reset(size_t jump, const double **arg, double **res, long long
 """
 
 
-def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> list[str]:
+def _tables(traced: Trace | NetworkTrace) -> list[str]:
     automaton, layout, names = traced.automaton, traced.layout, NameTable()
     starts = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
     margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
@@ -84,8 +74,6 @@ def _tables(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable]) -> l
         array("ModelName", "discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
         array("ModelName", "margin_names", map(names.entry, margin_names)),
         array("ModelJump", "jumps", _jumps(traced, names)),
-        array("size_t", "clock_jump", (str(clock.jump) for clock in automaton.clocks)),
-        array("ModelVariable", "variables", (_variable(variable, names) for variable in variables)),
     ]
     return [*tables, names.definition("names")]
 
@@ -110,25 +98,10 @@ def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
     return rows
 
 
-def _variable(variable: FmuVariable, names: NameTable) -> str:
-    kind = (variable.type.value, variable.bank.value)
-    flags = map(boolean, (variable.discrete, variable.calculated, variable.tunable))
-    return row(names.entry(variable.name), variable.index, variable.size, *kind, *flags)
-
-
-def _model(
-    traced: Trace | NetworkTrace,
-    variables: Sequence[FmuVariable],
-    token: str,
-    kinds: Collection[str],
-    work: Sequence[int],
-) -> str:
+def _model(traced: Trace | NetworkTrace, work: Sequence[int]) -> str:
     automaton, sizes = traced.automaton, traced.layout.sizes
     fields = {
         "name": string(automaton.name),
-        "token": string(token),
-        "co_simulation": boolean("cs" in kinds),
-        "model_exchange": boolean("me" in kinds),
         "n_states": sizes[Kind.STATE],
         "n_discrete": sizes[Kind.DISCRETE],
         "n_inputs": sizes[Kind.INPUT],
@@ -137,8 +110,6 @@ def _model(
         "n_margins": sum(info.trigger is Trigger.STATE for info in automaton.jumps),
         "n_times": sum(info.trigger is Trigger.TIME for info in automaton.jumps),
         "n_jumps": len(automaton.jumps),
-        "n_clocks": len(automaton.clocks),
-        "n_variables": len(variables),
         **dict(zip(("n_arg", "n_res", "n_iw", "n_w"), work, strict=True)),
         "flow_priority": boolean(automaton.priority is Priority.FLOW),
         "has_flow_set": boolean(automaton.has_flow_set),
@@ -146,7 +117,7 @@ def _model(
         **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
         **{name: f"hybrid_{name}" for name in _MAPS},
         "scales": row(*(f".{name} = {_number(value)}" for name, value in scales.of_models().items())),
-        **{name: name for name in ("nominals", "whole", "jumps", "clock_jump", "variables")},
+        **{name: name for name in ("nominals", "whole", "jumps")},
         **{name: name for name in ("state_names", "discrete_names", "margin_names", "names")},
     }
-    return "const Model model = {\n" + "".join(f"    .{key} = {value},\n" for key, value in fields.items()) + "};\n"
+    return definition("Model", "model", fields)
