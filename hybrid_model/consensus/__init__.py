@@ -36,7 +36,7 @@ from hybrid_model.consensus.laws.double_integrators import (
     double_integrator_loop,
     double_integrator_wires,
 )
-from hybrid_model.consensus.laws.triggers import DynamicTrigger, EventGenerator, MixedTrigger, StaticTrigger
+from hybrid_model.consensus.laws.threshold_triggers import DynamicTrigger, EventGenerator, MixedTrigger, StaticTrigger
 from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop, vector_wires
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.runs.metrics import communication, gap_statistics, performance, run_metrics
@@ -46,30 +46,27 @@ from hybrid_model.consensus.scenario.channel import Channel
 from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
 from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.consensus.weights.automata import (
-    ConstantWeights,
-    GatedAbsoluteSineWeights,
-    GatedSineWeights,
-    PeriodicSwitching,
-    SineWeights,
-    SquareWeights,
-)
 from hybrid_model.consensus.weights.connectivity import (
     all_spanning_trees,
     joint_connectivity_window,
     spanning_tree_count,
 )
-from hybrid_model.consensus.weights.functions import FunctionWeight, distance_weights, reliability_weight
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine
+from hybrid_model.consensus.weights.constant import ConstantWeight, ConstantWeights
+from hybrid_model.consensus.weights.distances import distance_weights, reliability_weight
+from hybrid_model.consensus.weights.function import FunctionWeight, FunctionWeights
+from hybrid_model.consensus.weights.gated_sine import GatedAbsoluteSineWeights, GatedSine, GatedSineWeights
+from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
 from hybrid_model.consensus.weights.random_switching import (
     jointly_connected_sequence,
     markov_sequence,
     random_dwell_sequence,
 )
-from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
-from hybrid_model.consensus.weights.table_automata import FunctionWeights, SequenceSwitching, TabulatedWeights
-from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
-from hybrid_model.consensus.weights.waves import SineWeight, SquareWeight
+from hybrid_model.consensus.weights.sampled import SampledWeight
+from hybrid_model.consensus.weights.sine import SineWeight, SineWeights
+from hybrid_model.consensus.weights.square import SquareWeight, SquareWeights
+from hybrid_model.consensus.weights.switching import PeriodicSwitching
+from hybrid_model.consensus.weights.switching_sequence import SequenceSwitching, SwitchingSequence
+from hybrid_model.consensus.weights.tabulated import TabulatedWeights
 
 __all__ = [
     "AgentGraph",

@@ -3,7 +3,7 @@
 from c_runs import Witness
 from witnesses import Cascade, FlowFirst, Hill, Mix, Ramps, Timers
 
-from hybrid_model.consensus.weights.automata import GatedSineWeights
+from hybrid_model.consensus.weights.gated_sine import GatedSineWeights
 from hybrid_model.models import BouncingBall
 
 WITNESSES = {

@@ -13,7 +13,7 @@ from witnesses import Cascade, Mix, Ramps
 from witnesses_driven import Tank
 
 import hybrid_model as hm
-from hybrid_model.consensus.weights.automata import GatedSineWeights
+from hybrid_model.consensus.weights.gated_sine import GatedSineWeights
 
 PLAIN = "3.0 CS without events"
 NOT_YET_KNOWN, UNCHANGED, CHANGED = range(3)

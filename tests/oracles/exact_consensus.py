@@ -19,7 +19,8 @@ import numpy as np
 
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight, WeightMap
+from hybrid_model.consensus.weights.constant import ConstantWeight
+from hybrid_model.consensus.weights.gated_sine import WeightMap
 from hybrid_model.consensus.weights.switching import NoSwitching
 
 EPS = np.finfo(float).eps

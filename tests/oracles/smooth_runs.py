@@ -8,7 +8,9 @@ Sampled checks have a loop of their own: at each check the errors are compared w
 import numpy as np
 
 from hybrid_model.consensus.scenario.trigger import TriggerKind
-from hybrid_model.consensus.weights.carriers import RippleCarrier, SineCarrier, UnitCarrier, WeightMap
+from hybrid_model.consensus.weights.carriers import UnitCarrier
+from hybrid_model.consensus.weights.gated_sine import SineCarrier, WeightMap
+from hybrid_model.consensus.weights.sine import RippleCarrier
 from oracles.exact_consensus import ClosedLoop
 
 MET = 1e-12

@@ -9,10 +9,11 @@ from bisect import bisect_right
 
 import numpy as np
 
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight
-from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching
-from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
-from hybrid_model.consensus.weights.waves import SquareWeight
+from hybrid_model.consensus.weights.constant import ConstantWeight
+from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
+from hybrid_model.consensus.weights.sampled import SampledWeight
+from hybrid_model.consensus.weights.square import SquareWeight
+from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
 
 
 def table_run(scenario):
@@ -120,7 +121,7 @@ def line(wave, t):
 def active(switching, t):
     if isinstance(switching, NoSwitching):
         return range(1, switching.edge_count + 1)
-    if isinstance(switching, PeriodicSwitching):
+    if isinstance(switching, SwitchingCycle):
         return switching.active[int(t // switching.dwell) % len(switching.active)]
     total = sum(switching.dwells)
     local = t % total if switching.repeat else t
@@ -134,6 +135,6 @@ def active(switching, t):
 def instants(switching, end):
     if isinstance(switching, NoSwitching):
         return []
-    dwells = [switching.dwell] if isinstance(switching, PeriodicSwitching) else switching.dwells
-    repeat = isinstance(switching, PeriodicSwitching) or switching.repeat
+    dwells = [switching.dwell] if isinstance(switching, SwitchingCycle) else switching.dwells
+    repeat = isinstance(switching, SwitchingCycle) or switching.repeat
     return repeated(tuple(np.concatenate(([0.0], np.cumsum(dwells)))), sum(dwells) if repeat else None, end)

@@ -6,12 +6,15 @@ from hybrid_model import consensus
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
 from hybrid_model.consensus.scenario.definition import Scenario, Weights
 from hybrid_model.consensus.scenario.files import read_scenario
-from hybrid_model.consensus.weights.blocks import switching_block, weights_block
-from hybrid_model.consensus.weights.functions import distance_weights
+from hybrid_model.consensus.weights.distances import distance_weights
+from hybrid_model.consensus.weights.function import FunctionWeights
+from hybrid_model.consensus.weights.kinds import weights_block
+from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
 from hybrid_model.consensus.weights.random_switching import markov_sequence
+from hybrid_model.consensus.weights.sampled import SampledWeight
 from hybrid_model.consensus.weights.switching import NoSwitching
-from hybrid_model.consensus.weights.table_automata import FunctionWeights, SequenceSwitching, TabulatedWeights
-from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
+from hybrid_model.consensus.weights.switching_sequence import SequenceSwitching
+from hybrid_model.consensus.weights.tabulated import TabulatedWeights
 
 RING = {"agents": 4, "edges": [[1, 2], [2, 3], [3, 4], [4, 1]], "initial": [1.0, 2.0, 0.3, 0.4]}
 WEIGHTS = {
@@ -76,19 +79,16 @@ def weights_cases(make_case):
             SequenceSwitching(starts=[0.0, 0.7, 1.0], active=[[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]], raw=[2.0, 3.0]), 5.0
         ),
         "markov_block": make_case(
-            switching_block(
-                markov_sequence(
-                    [[1], [2], [1, 2]],
-                    2,
-                    transition=[[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.3, 0.3, 0.4]],
-                    shortest=0.2,
-                    longest=0.9,
-                    duration=5.0,
-                    seed=3,
-                    repeat=True,
-                ),
-                [0, 1],
-            ),
+            markov_sequence(
+                [[1], [2], [1, 2]],
+                2,
+                transition=[[0.0, 0.5, 0.5], [0.5, 0.0, 0.5], [0.3, 0.3, 0.4]],
+                shortest=0.2,
+                longest=0.9,
+                duration=5.0,
+                seed=3,
+                repeat=True,
+            ).automaton([0, 1]),
             12.0,
         ),
     }

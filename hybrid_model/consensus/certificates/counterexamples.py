@@ -21,7 +21,8 @@ from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
 from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
+from hybrid_model.consensus.weights.constant import ConstantWeight
+from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
 from hybrid_model.consensus.weights.switching import NoSwitching
 
 __all__ = [

@@ -12,8 +12,6 @@ __all__ = ["Envelope", "envelope", "sampled_threshold"]
 Envelope = tuple[tuple[float, float], ...]
 """Pairs (c, beta): ``|e_i(t)| <= sum of c exp(-beta t)``."""
 
-_PLAIN = (TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.SELF_TRIGGERED)
-
 
 def envelope(scenario: Scenario) -> Envelope | None:
     """The bound on the errors that the trigger law enforces at every time; None if there is none known in advance.
@@ -24,12 +22,10 @@ def envelope(scenario: Scenario) -> Envelope | None:
     trigger = scenario.trigger
     if not scenario.channel.ideal:
         return None
-    if trigger.kind in _PLAIN:
-        return ((trigger.threshold, trigger.decay),)
-    if trigger.kind is TriggerKind.MIXED:
-        return ((trigger.offset, 0.0), (trigger.threshold, trigger.decay))
     if trigger.kind is TriggerKind.CONTINUOUS:
         return ()
+    if trigger.has_level and trigger.kind is not TriggerKind.SAMPLED:
+        return trigger.threshold_in_time.exponentials
     return None
 
 

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import lambertw
 
 from hybrid_model.consensus.certificates.analysis import Analysis
-from hybrid_model.consensus.weights.carriers import Carrier, RippleCarrier, SineCarrier, UnitCarrier, WeightMap
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
-from hybrid_model.consensus.weights.tables import LinearCarrier
 
 __all__ = ["excited_gap", "frozen_gap", "growing_gap", "printed_gap"]
 
@@ -145,20 +143,7 @@ def _steepest(analysis: Analysis, rates: NDArray[np.float64]) -> float | None:
     """Bound on ``|sum rates*w'|`` between the corners of the weights; None if a carrier's slope is not known."""
     pieces = analysis.scenario.edge_weights.pieces(0.0, analysis.cycle)
     amplitudes = np.max([piece.amplitudes for piece in pieces], axis=0)
-    slopes = [_slope(carrier) for carrier in analysis.scenario.edge_weights.carriers]
+    slopes = [carrier.steepness for carrier in analysis.scenario.edge_weights.carriers]
     if any(slope is None for slope in slopes):
         return None
     return float(np.sum(rates * amplitudes * np.array(slopes, dtype=float)))
-
-
-def _slope(carrier: Carrier) -> float | None:
-    """Bound on the slope [1/s] of a carrier between the breakpoints of its weight; None if it is not known."""
-    if isinstance(carrier, UnitCarrier):
-        return 0.0
-    if isinstance(carrier, SineCarrier):
-        return (4.0 if carrier.map is WeightMap.SQUARE else 2.0) * carrier.rate
-    if isinstance(carrier, RippleCarrier):
-        return carrier.depth * carrier.rate
-    if isinstance(carrier, LinearCarrier):
-        return float(np.max(np.abs(carrier.slopes)))
-    return None

@@ -18,7 +18,7 @@ from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import Edge, disagreement_basis, incidence, weighted_laplacian
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight
+from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.linear import StateSpace, h_infinity_norm, named_system
 
 __all__ = ["EdgeGains", "edge_domain_gains", "edge_domain_system", "edge_states_system", "impulse_modes"]

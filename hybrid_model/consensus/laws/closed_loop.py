@@ -5,11 +5,11 @@ from __future__ import annotations
 import hybrid_model as hm
 from hybrid_model.consensus.laws.agents import ContinuousIntegrator, Integrator, agent
 from hybrid_model.consensus.laws.channels import LossyChannel, link_seeds
-from hybrid_model.consensus.laws.trigger_blocks import Surroundings, trigger_block
+from hybrid_model.consensus.laws.event_generators import Surroundings, event_generator
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
-from hybrid_model.consensus.weights.blocks import switching_block, weights_block
+from hybrid_model.consensus.weights.kinds import weights_block
 
 
 def agent_name(number: int) -> str:
@@ -86,7 +86,7 @@ def _agent(scenario: Scenario, number: int) -> hm.Composition:
         motion(degree=len(edges), x=initial, gain=scenario.network.gain),
         weights_block([scenario.weights.waveforms[k] for k in edges]),
         _trigger(scenario, edges),
-        switching_block(scenario.switching, edges),
+        scenario.switching.automaton(edges),
         _channel(scenario, number, edges),
     )
 
@@ -94,7 +94,7 @@ def _agent(scenario: Scenario, number: int) -> hm.Composition:
 def _trigger(scenario: Scenario, edges: list[int]) -> hm.HybridAutomaton:
     waveforms = [scenario.weights.waveforms[k] for k in edges]
     around = Surroundings(edges, waveforms, scenario.switching, scenario.network.gain)
-    return trigger_block(scenario.trigger, around)
+    return event_generator(scenario.trigger, around)
 
 
 def _channel(scenario: Scenario, number: int, edges: list[int]) -> hm.HybridAutomaton | None:

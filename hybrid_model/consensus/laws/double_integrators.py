@@ -19,12 +19,10 @@ import numpy.typing as npt
 
 import hybrid_model as hm
 from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of, other_end
-from hybrid_model.consensus.laws.vector_agents import require_norm_trigger
+from hybrid_model.consensus.laws.vector_agents import NormThreshold, require_norm_trigger, start_numbers
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario
-from hybrid_model.consensus.scenario.start_states import start_numbers
-from hybrid_model.consensus.scenario.thresholds import mixed_threshold
-from hybrid_model.consensus.weights.blocks import switching_block, weights_block
+from hybrid_model.consensus.weights.kinds import weights_block
 from hybrid_model.declare.variables import Value
 
 SENT = ("position", "velocity", "time")
@@ -55,40 +53,25 @@ class DoubleIntegrator(hm.HybridAutomaton):
         return {"x": s.v, "v": -s.gain * np.sum(s.weights * difference)}
 
 
-class ModelBasedTrigger(hm.HybridAutomaton):
-    """Broadcasts position and velocity when ``|(xhat - x, mu (vhat - v))| >= c0 + c1 exp(-beta t)``.
-
-    The margin compares squares: it is smooth where the error is zero.
-    """
+class ModelBasedTrigger(NormThreshold):
+    """Broadcasts position and velocity when ``|(xhat - x, mu (vhat - v))| >= c0 + c1 exp(-beta t)``."""
 
     x = hm.Input(0.0, description="position of the agent")
     v = hm.Input(0.0, unit="1/s", description="velocity of the agent")
     position = hm.DiscreteState(computed=True, output=True, description="position last broadcast")
     velocity = hm.DiscreteState(computed=True, output=True, unit="1/s", description="velocity last broadcast")
     time = hm.DiscreteState(computed=True, output=True, unit="s", description="time of the last broadcast")
-    events = hm.DiscreteState(0, integer=True, output=True, description="number of broadcasts since the start")
-    offset = hm.Parameter(0.0, description="threshold c0 that stays")
-    threshold = hm.Parameter(0.5, description="threshold c1 that decays")
-    decay = hm.Parameter(0.0, unit="1/s", description="decay rate beta")
     damping = hm.Parameter(1.0, unit="s", description="weight mu of the velocities")
-    broadcast_clock = hm.Clock("broadcast", description="ticks with each broadcast")
 
     def start_map(self, s: hm.Values) -> dict[str, Value]:
-        """The first broadcast."""
+        """The present position and velocity, and the time."""
         return {"position": s.x, "velocity": s.v, "time": s.t}
 
-    def error_too_large(self, s: hm.Values) -> Value:
-        """The trigger function, in squares."""
+    def squared_error(self, s: hm.Values) -> Value:
+        """``(xhat - x)**2 + mu**2 (vhat - v)**2``."""
         position_error = s.position + (s.t - s.time) * s.velocity - s.x
         velocity_error = s.damping * (s.velocity - s.v)
-        level = mixed_threshold(s.offset, s.threshold, s.decay, s.t)
-        return position_error**2 + velocity_error**2 - level**2
-
-    def send(self, s: hm.Values) -> dict[str, Value]:
-        """Broadcast the present position and velocity."""
-        return {"position": s.x, "velocity": s.v, "time": s.t, "events": s.events + 1}
-
-    transitions = (hm.Jump("broadcast", error_too_large, send),)
+        return position_error**2 + velocity_error**2
 
 
 def double_integrator_agents(
@@ -143,7 +126,7 @@ def double_integrator_loop(scenario: Scenario, velocities: npt.ArrayLike, dampin
 def _agent(scenario: Scenario, number: int, velocity: float, damping: float) -> hm.Composition:
     edges = edges_of(scenario, number)
     network, trigger = scenario.network, scenario.trigger
-    switching = switching_block(scenario.switching, edges)
+    switching = scenario.switching.automaton(edges)
     parts: dict[str, hm.Automaton] = {"weights": weights_block([scenario.weights.waveforms[k] for k in edges])}
     wires = {"trigger.x": "motion.x", "trigger.v": "motion.v"}
     wires |= {f"motion.own_{item}": f"trigger.{item}" for item in SENT}
@@ -154,9 +137,7 @@ def _agent(scenario: Scenario, number: int, velocity: float, damping: float) -> 
     parts["motion"] = DoubleIntegrator(
         degree=len(edges), x=network.initial[number - 1], v=velocity, gain=network.gain, damping=damping
     )
-    parts["trigger"] = ModelBasedTrigger(
-        offset=trigger.offset, threshold=trigger.threshold, decay=trigger.decay, damping=damping
-    )
+    parts["trigger"] = ModelBasedTrigger(damping=damping, **trigger.numbers)
     names = {f"motion.{item}": item for item in ("x", "v", "positions", "velocities", "times")}
     names |= {f"trigger.{item}": f"broadcast_{item}" for item in SENT}
     names |= {f"trigger.{item}": item for item in ("events", "broadcast_clock")}

@@ -1,4 +1,4 @@
-"""Forecast of an agent's error while nothing is received and its weights are waves: the first time it is too large.
+"""Forecast of an agent's error while nothing is received and its weights are known: the first time it is too large.
 
 Everything here is arithmetic on values, without a branch on any, so that it also traces on symbols.
 """
@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybrid_model.consensus.weights.clockwork import not_negative
+from hybrid_model.consensus.scenario.trigger import Threshold
+from hybrid_model.consensus.weights.carriers import Carrier
 from hybrid_model.declare.variables import Value
 
 ROUNDS = 8
@@ -24,31 +25,6 @@ TINY = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
-class Wave:
-    """Weights ``mean + cosine*cos(rate*t) + sine*sin(rate*t)``, arrays over the edges; rate in rad/s, positive."""
-
-    mean: Value
-    cosine: Value
-    sine: Value
-    rate: Value
-
-    def value(self, t: Value) -> Value:
-        """Weights at time `t` in s."""
-        return not_negative(self.mean + self.cosine * np.cos(self.rate * t) + self.sine * np.sin(self.rate * t))
-
-    def integral(self, a: Value, b: Value) -> Value:
-        """Integrals from `a` to `b` in s, in a form that does not cancel for short intervals."""
-        middle, half = self.rate * (a + b) / 2, self.rate * (b - a) / 2
-        swing = self.cosine * np.cos(middle) + self.sine * np.sin(middle)
-        return self.mean * (b - a) + 2.0 * swing * np.sin(half) / self.rate
-
-    @property
-    def steepness(self) -> Value:
-        """Bounds of the weights' slopes."""
-        return self.rate * (np.abs(self.cosine) + np.abs(self.sine))
-
-
-@dataclass(frozen=True, eq=False)
 class Meeting:
     """How far a search got: at `t` the threshold is met, or the search is still open, or the piece has ended."""
 
@@ -59,33 +35,32 @@ class Meeting:
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """The error ``e(t) = error_then + sum_j pull_j integral of w_j from since to t`` against ``c exp(-beta t)``.
+    """The error ``e(t) = error_then + sum_j pull_j integral of carrier_j from since to t`` against a threshold.
 
     Parameters
     ----------
-    wave : Wave
-        Weights of the edges.
+    carrier : Carrier
+        Shapes of the edges' weights, with a bound on their slopes.
     pull : array
-        ``k (xhat - xhat_j)``, zero for edges that are not active.
+        ``k a_j (xhat - xhat_j)`` with the amplitudes a_j of the weights, zero for edges that are not active.
     error_then, since : float
         The error at the time `since` in s.
-    threshold, decay : float
-        c and beta.
+    threshold : Threshold
+        With no offset: ``c exp(-beta t)``.
     scale : float
         Size of the states, for their rounding.
     """
 
-    wave: Wave
+    carrier: Carrier
     pull: Value
     error_then: Value
     since: Value
-    threshold: Value
-    decay: Value
+    threshold: Threshold
     scale: Value
 
     def error(self, t: Value) -> Value:
         """The error at time `t` in s."""
-        return self.error_then + np.sum(self.pull * self.wave.integral(self.since, t))
+        return self.error_then + np.sum(self.pull * self.carrier.integral(self.since, t))
 
     def first_meeting(self, end: Value) -> Meeting:
         """Search from `since` to `end` for the first time at which ``|e|`` meets the threshold.
@@ -98,7 +73,7 @@ class Forecast:
             step, _ = self._step(t)
             t = np.minimum(t + step, end)
         step, room = self._step(t)
-        level = self.threshold * np.exp(-self.decay * t)
+        level = self.threshold.at(t)
         rounding = np.minimum(NOISE * self.scale, 0.25 * level)
         met = np.logical_or(room <= rounding, step <= RESOLVED * np.maximum(1.0, t))
         return Meeting(t, met, np.logical_and(np.logical_not(met), t < end))
@@ -106,11 +81,11 @@ class Forecast:
     def _step(self, t: Value) -> tuple[Value, Value]:
         """A step that passes no root, and the distance of ``|e|`` from the threshold."""
         error = self.error(t)
-        level = self.threshold * np.exp(-self.decay * t)
-        slope = np.sum(self.pull * self.wave.value(t))
-        curvature = np.maximum(np.sum(np.abs(self.pull) * self.wave.steepness), FLATTEST)
+        level = self.threshold.at(t)
+        slope = np.sum(self.pull * self.carrier.value(t))
+        curvature = np.maximum(np.sum(np.abs(self.pull) * self.carrier.steepness), FLATTEST)
         above, below = level - error, level + error
-        sink = self.decay * level
+        sink = self.threshold.decay * level
         step = np.minimum(_safe_step(above, slope + sink, curvature), _safe_step(below, sink - slope, curvature))
         return step, np.minimum(above, below)
 

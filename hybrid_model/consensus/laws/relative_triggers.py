@@ -17,8 +17,8 @@ from abc import abstractmethod
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.consensus.laws.triggers import EventGenerator
-from hybrid_model.consensus.scenario.thresholds import exponential_threshold
+from hybrid_model.consensus.laws.threshold_triggers import EventGenerator
+from hybrid_model.consensus.scenario.trigger import Threshold
 from hybrid_model.declare.variables import Value
 
 
@@ -58,7 +58,7 @@ class RelativeTrigger(NeighbourhoodTrigger):
 
     def error_too_large(self, s: hm.Values) -> Value:
         """The trigger function."""
-        return self.excess(s) - exponential_threshold(s.floor, s.decay, s.t)
+        return self.excess(s) - Threshold(s.floor, s.decay).at(s.t)
 
     transitions = (hm.Jump("broadcast", error_too_large, EventGenerator.send),)
 

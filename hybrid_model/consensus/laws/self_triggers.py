@@ -12,16 +12,20 @@ those of the dynamic trigger (D. V. Dimarogonas, E. Frazzoli, K. H. Johansson, I
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.consensus.laws.forecast import Forecast, Wave
-from hybrid_model.consensus.laws.triggers import EventGenerator
-from hybrid_model.consensus.weights.clockwork import dwell_boundary, dwell_index
+from hybrid_model.consensus.laws.forecast import Forecast
+from hybrid_model.consensus.laws.threshold_triggers import EventGenerator
+from hybrid_model.consensus.scenario.trigger import Threshold
+from hybrid_model.consensus.weights.clockwork import dwell_boundary, dwell_index, in_turn
+from hybrid_model.consensus.weights.constant import ConstantWeights
+from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton, ForeseenWeights
+from hybrid_model.consensus.weights.gated_sine import GatedAbsoluteSineWeights, GatedSineWeights
+from hybrid_model.consensus.weights.sine import SineWeights
 from hybrid_model.declare.variables import Value
 
 INSTANT = 1e-9
@@ -30,15 +34,14 @@ NONE = -1.0
 """A time that means never: a discrete state holds finite numbers only, and no run begins before zero."""
 
 
-class SelfTrigger(EventGenerator):
-    """A self-triggered event generator for weights whose pieces between breakpoints are waves; subclasses give them.
+class SelfTrigger(EventGenerator, ForeseenWeights):
+    """A self-triggered event generator for weights that can be computed ahead; subclasses say which.
 
     Its discrete states are a plan: the predicted error and the time that it holds for, the values heard from the
     neighbours, and either the time of the next broadcast, or a time up to which there is none and at which planning
     goes on, or neither, if the present piece of the weights ends before.
     """
 
-    degree = hm.Dimension("number of neighbours")
     phases = hm.Dimension("number of graphs in the cycle")
     neighbours = hm.Input(0.0, shape="degree", discrete=True, description="broadcast values of the neighbours")
     heard = hm.DiscreteState(shape="degree", computed=True, internal=True, description="what the plan takes them for")
@@ -55,29 +58,25 @@ class SelfTrigger(EventGenerator):
     dwell = hm.Parameter(1e9, unit="s", description="time that each graph stays")
     active = hm.Parameter(1.0, shape=("phases", "degree"), description="1 where an edge is active in a graph, else 0")
 
-    @abstractmethod
-    def wave(self, s: hm.Values, pieces: Mapping[str, Value]) -> Wave:
-        """The weights on the present pieces, if all edges were active."""
-
     def present(self, s: hm.Values) -> dict[str, Value]:
-        """Indices of the present pieces of the weights."""
-        return {"interval": s.interval}
+        """See `ForeseenWeights.present`; the dwell interval is a piece too."""
+        return {**super().present(s), "interval": s.interval}
 
-    def at_time(self, s: hm.Values) -> dict[str, Value]:
-        """Indices of the pieces that hold the present time."""
-        return {"interval": dwell_index(s.t, s.dwell)}
+    def pieces_at(self, s: hm.Values) -> dict[str, Value]:
+        """See `ForeseenWeights.pieces_at`."""
+        return {**super().pieces_at(s), "interval": dwell_index(s.t, s.dwell)}
 
     def piece_end(self, s: hm.Values, pieces: Mapping[str, Value]) -> Value:
-        """Time of the next breakpoint of the weights."""
-        return dwell_boundary(pieces["interval"], s.dwell)
+        """See `ForeseenWeights.piece_end`."""
+        return np.minimum(super().piece_end(s, pieces), dwell_boundary(pieces["interval"], s.dwell))
 
     # The plan.
 
     def start_map(self, s: hm.Values) -> dict[str, Value]:
         """The first broadcast, and the first plan."""
-        pieces = self.at_time(s)
+        pieces = self.pieces_at(s)
         return {
-            **super().start_map(s),
+            **EventGenerator.start_map(self, s),
             "heard": s.neighbours,
             **pieces,
             **self._plan(s, pieces, 0.0, s.x, s.neighbours),
@@ -92,14 +91,9 @@ class SelfTrigger(EventGenerator):
         """Plan from where the last plan has led."""
         return self._plan(s, self.present(s), self.predicted(s), s.broadcast, s.heard)
 
-    def next_piece(self, s: hm.Values) -> Value:
-        """Time at which the weights have a breakpoint."""
-        return self.piece_end(s, self.present(s))
-
     def enter_piece(self, s: hm.Values) -> dict[str, Value]:
         """Move on to the pieces of the weights that begin now, and plan."""
-        now = self.present(s)
-        over = {key: np.maximum(index, now[key]) for key, index in self.at_time(s).items()}
+        over = super().enter_piece(s)
         return {**over, **self._plan(s, over, self.predicted(s), s.broadcast, s.heard)}
 
     def resumption(self, s: hm.Values) -> Value:
@@ -134,7 +128,7 @@ class SelfTrigger(EventGenerator):
         return {**super().send(s), **self._plan(s, self.present(s), 0.0, s.x, s.heard)}
 
     transitions: ClassVar[tuple[hm.Jump | hm.TimeEvent, ...]] = (
-        hm.TimeEvent("piece", next_piece, enter_piece, internal=True),
+        hm.TimeEvent("piece", ForeseenWeights.next_piece, enter_piece, internal=True),
         hm.TimeEvent("resume", resumption, replan, internal=True),
         hm.Jump("hear", news, hear),
         hm.TimeEvent("broadcast", alarm, send),
@@ -154,9 +148,32 @@ class SelfTrigger(EventGenerator):
     def _forecast(
         self, s: hm.Values, pieces: Mapping[str, Value], error: Value, since: Value, broadcast: Value, heard: Value
     ) -> Forecast:
-        count = s.active.shape[0]
-        row = pieces["interval"] - count * np.floor(pieces["interval"] / count)
-        active = np.where(np.arange(count) == row, 1.0, 0.0) @ s.active
-        pull = s.gain * active * (broadcast - heard)
+        active = in_turn(pieces["interval"], s.active.shape[0]) @ s.active
+        pull = s.gain * self.amplitude(s, pieces) * active * (broadcast - heard)
         scale = np.maximum(1.0, np.abs(broadcast))
-        return Forecast(self.wave(s, pieces), pull, error, since, s.threshold, s.decay, scale)
+        return Forecast(self.carrier(s), pull, error, since, Threshold(s.threshold, s.decay), scale)
+
+
+class ConstantSelfTrigger(SelfTrigger, ConstantWeights):
+    """Self-triggered broadcasting over edges of constant weight, switched on and off by the table of active graphs."""
+
+
+class SineSelfTrigger(SelfTrigger, SineWeights):
+    """Self-triggered broadcasting over edges with the weights ``mean (1 + depth sin(rate t - phase))``."""
+
+
+class GatedSineSelfTrigger(SelfTrigger, GatedSineWeights):
+    """Self-triggered broadcasting over edges with the paper's gated sine weights ``g**2``."""
+
+
+class GatedAbsoluteSineSelfTrigger(SelfTrigger, GatedAbsoluteSineWeights):
+    """Self-triggered broadcasting over edges with the gated sine weights in the reading ``|g|``."""
+
+
+SELF_TRIGGERS: dict[type[EdgeAutomaton], type[SelfTrigger]] = {
+    ConstantWeights: ConstantSelfTrigger,
+    SineWeights: SineSelfTrigger,
+    GatedSineWeights: GatedSineSelfTrigger,
+    GatedAbsoluteSineWeights: GatedAbsoluteSineSelfTrigger,
+}
+"""Automaton of the edges -> what broadcasts over them."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.consensus.laws.triggers import EventGenerator
-from hybrid_model.consensus.scenario.thresholds import exponential_threshold
+from hybrid_model.consensus.laws.threshold_triggers import EventGenerator
+from hybrid_model.consensus.scenario.trigger import Threshold
 from hybrid_model.consensus.weights.clockwork import dwell_boundary, dwell_index
 from hybrid_model.declare.variables import Value
 
@@ -43,7 +43,7 @@ class SampledTrigger(EventGenerator):
     def error_too_large(self, s: hm.Values) -> Value:
         """The trigger function at the last check."""
         checked = dwell_boundary(s.checks - 1, s.period)
-        return np.abs(s.broadcast - s.sample) - exponential_threshold(s.threshold, s.decay, checked)
+        return np.abs(s.broadcast - s.sample) - Threshold(s.threshold, s.decay).at(checked)
 
     def send(self, s: hm.Values) -> dict[str, Value]:
         """Broadcast the sample; the jump follows the check at the same instant."""

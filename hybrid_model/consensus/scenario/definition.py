@@ -10,13 +10,11 @@ from hybrid_model.consensus.messages import ScenarioError, shown
 from hybrid_model.consensus.scenario.channel import IDEAL, Channel
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine
+from hybrid_model.consensus.weights.kinds import WeightKind
 from hybrid_model.consensus.weights.switching import Switching
-from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
 from hybrid_model.consensus.weights.waveform import Waveform
-from hybrid_model.consensus.weights.waves import SineWeight, SquareWeight
 
-__all__ = ["Network", "Scenario", "Underlying", "WeightKind", "Weights", "replace_trigger"]
+__all__ = ["Network", "Scenario", "Underlying", "Weights", "replace_trigger"]
 
 
 class Underlying(enum.Enum):
@@ -24,28 +22,6 @@ class Underlying(enum.Enum):
 
     LISTED = "listed"
     COMPLETE = "complete"
-
-
-class WeightKind(enum.Enum):
-    """The families of waveforms; a scenario file can name all of them but FUNCTION, which is given in Python."""
-
-    GATED_SINE = "gated-sine"
-    CONSTANT = "constant"
-    SINE = "sine"
-    SQUARE = "square"
-    PIECEWISE = "piecewise"
-    SAMPLED = "sampled"
-    FUNCTION = "function"
-
-
-_KINDS: dict[type, WeightKind] = {
-    GatedSine: WeightKind.GATED_SINE,
-    ConstantWeight: WeightKind.CONSTANT,
-    SineWeight: WeightKind.SINE,
-    SquareWeight: WeightKind.SQUARE,
-    PiecewiseWeight: WeightKind.PIECEWISE,
-    SampledWeight: WeightKind.SAMPLED,
-}
 
 
 @dataclass(frozen=True)
@@ -119,7 +95,7 @@ class Weights:
     @property
     def kind(self) -> WeightKind:
         """The family of the waveforms."""
-        return _KINDS.get(type(self.waveforms[0]), WeightKind.FUNCTION)
+        return next(kind for kind in WeightKind if isinstance(self.waveforms[0], kind.waveform))
 
 
 @dataclass(frozen=True)

@@ -8,23 +8,18 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+from hybrid_model.consensus.entries import Entries, suggestion
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.affordable import require_affordable
 from hybrid_model.consensus.scenario.channel import IDEAL, Channel
-from hybrid_model.consensus.scenario.definition import (
-    Network,
-    Scenario,
-    Underlying,
-    replace_trigger,
-)
+from hybrid_model.consensus.scenario.definition import Network, Scenario, Underlying, Weights, replace_trigger
 from hybrid_model.consensus.scenario.read_switching import read_switching
-from hybrid_model.consensus.scenario.read_weights import read_weights
-from hybrid_model.consensus.scenario.tables import Table, suggestion
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind, trigger_keys
+from hybrid_model.consensus.weights.kinds import read_weights
 from hybrid_model.consensus.weights.switching import NoSwitching, Switching
 
 __all__ = ["load_scenario", "preset_names", "read_scenario"]
 
+MOST_CHANGES = 1e7
 _PRESETS = resources.files("hybrid_model.consensus.scenario") / "presets"
 
 
@@ -79,20 +74,48 @@ def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = "
     ScenarioError
         If a key is unknown or missing, or a value has the wrong type or is out of range; the message names the entry.
     """
-    top = Table("the scenario", entries, ("name", "stop_time", "network", "weights", "switching", "trigger", "channel"))
+    top = Entries(
+        "the scenario", entries, ("name", "stop_time", "network", "weights", "switching", "trigger", "channel")
+    )
     network = _read_network(_subtable(top, "network", ("agents", "edges", "initial", "gain", "underlying")))
     edge_count = len(network.edges)
     scenario = Scenario(
         name=top.text("name"),
         stop_time=top.number("stop_time"),
         network=network,
-        weights=read_weights(lambda known: _subtable(top, "weights", known), edge_count, Path(folder)),
+        weights=Weights(read_weights(lambda known: _subtable(top, "weights", known), edge_count, Path(folder))),
         switching=_read_switching(top, network, top.number("stop_time")),
         trigger=_read_trigger(top),
         channel=_read_channel(top),
     )
     require_affordable(scenario)
     return scenario
+
+
+def require_affordable(scenario: Scenario) -> None:
+    """Refuse a scenario whose run would have to stop more than `MOST_CHANGES` times, whatever its agents do.
+
+    More than can be run is a slip.
+
+    Raises
+    ------
+    ScenarioError
+        Names the key that is to blame.
+    """
+    end, period = scenario.stop_time, scenario.trigger.period
+    changes = [
+        (f"[weights] of edge {number}:", *change)
+        for number, wave in enumerate(scenario.weights.waveforms, start=1)
+        for change in wave.changes(end)
+    ]
+    changes += [("[switching]", *change) for change in scenario.switching.changes(end)]
+    changes += [("[trigger]", "period", end / period)] if period > 0 else []
+    for table, key, count in changes:
+        if count > MOST_CHANGES:
+            raise ScenarioError(
+                f"{table} {key} makes about {count:.1g} changes up to stop_time, {end:.6g} s; a run can have at most "
+                f"{MOST_CHANGES:.0g}, so change {key} or stop_time."
+            )
 
 
 def _load_file(path: Path) -> Scenario:
@@ -119,14 +142,14 @@ def _parse(source: str, content: bytes, folder: Path = Path()) -> Scenario:
         raise ScenarioError(f"{source}: {error}") from error
 
 
-def _subtable(top: Table, name: str, known: tuple[str, ...]) -> Table:
+def _subtable(top: Entries, name: str, known: tuple[str, ...]) -> Entries:
     entries = top.raw(name, f"must be a table, written [{name}]")
     if not isinstance(entries, dict):
         raise top.error(name, entries, f"must be a table, written [{name}]")
-    return Table(f"[{name}]", entries, known)
+    return Entries(f"[{name}]", entries, known)
 
 
-def _read_network(table: Table) -> Network:
+def _read_network(table: Entries) -> Network:
     edges = table.whole_number_lists("edges")
     for number, edge in enumerate(edges, start=1):
         if len(edge) != 2:
@@ -140,13 +163,13 @@ def _read_network(table: Table) -> Network:
     )
 
 
-def _read_switching(top: Table, network: Network, stop_time: float) -> Switching:
+def _read_switching(top: Entries, network: Network, stop_time: float) -> Switching:
     if "switching" not in top:
         return NoSwitching(len(network.edges))
     return read_switching(lambda known: _subtable(top, "switching", known), network, stop_time)
 
 
-def _read_trigger(top: Table) -> Trigger:
+def _read_trigger(top: Entries) -> Trigger:
     # The kind decides which keys are known, so it is read from a table that accepts whatever is given.
     given = top.raw("trigger", "must be a table, written [trigger]")
     kind = _subtable(top, "trigger", tuple(given) if isinstance(given, dict) else ()).choice("kind", TriggerKind)
@@ -155,7 +178,7 @@ def _read_trigger(top: Table) -> Trigger:
     return Trigger(kind, **{key: table.number(key, default) for key, default in defaults.items()})
 
 
-def _read_channel(top: Table) -> Channel:
+def _read_channel(top: Entries) -> Channel:
     if "channel" not in top:
         return IDEAL
     table = _subtable(top, "channel", ("delay", "loss", "seed", "slots"))

@@ -3,17 +3,17 @@
 import enum
 from collections.abc import Callable
 
+from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Network
-from hybrid_model.consensus.scenario.tables import Table
 from hybrid_model.consensus.weights.random_switching import (
     Order,
     jointly_connected_sequence,
     markov_sequence,
     random_dwell_sequence,
 )
-from hybrid_model.consensus.weights.switching import PeriodicSwitching, Switching, SwitchingSequence
-from hybrid_model.consensus.weights.switching_sequence import validate_active
+from hybrid_model.consensus.weights.switching import Switching, SwitchingCycle, validate_active
+from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
 
 __all__ = ["SWITCHING_KEYS", "SwitchingKind", "read_switching"]
 
@@ -40,7 +40,7 @@ SWITCHING_KEYS = {
 """The keys that each kind knows."""
 
 
-def read_switching(make_table: Callable[[tuple[str, ...]], Table], network: Network, stop_time: float) -> Switching:
+def read_switching(make_table: Callable[[tuple[str, ...]], Entries], network: Network, stop_time: float) -> Switching:
     """Read the switching; without a kind it is periodic.
 
     Parameters
@@ -68,17 +68,17 @@ def read_switching(make_table: Callable[[tuple[str, ...]], Table], network: Netw
         raise ScenarioError(f"[switching] {error}") from error
 
 
-def _periodic(table: Table, network: Network, stop_time: float) -> Switching:
-    return PeriodicSwitching(table.number("dwell"), _active(table, network), len(network.edges))
+def _periodic(table: Entries, network: Network, stop_time: float) -> Switching:
+    return SwitchingCycle(table.number("dwell"), _active(table, network), len(network.edges))
 
 
-def _sequence(table: Table, network: Network, stop_time: float) -> Switching:
+def _sequence(table: Entries, network: Network, stop_time: float) -> Switching:
     active = _active(table, network)
     dwells = table.per_item("dwell", len(active), "graphs in active")
     return SwitchingSequence(dwells, active, len(network.edges), table.flag("repeat", default=False))
 
 
-def _random_dwell(table: Table, network: Network, stop_time: float) -> Switching:
+def _random_dwell(table: Entries, network: Network, stop_time: float) -> Switching:
     return random_dwell_sequence(
         _active(table, network),
         len(network.edges),
@@ -91,7 +91,7 @@ def _random_dwell(table: Table, network: Network, stop_time: float) -> Switching
     )
 
 
-def _markov(table: Table, network: Network, stop_time: float) -> Switching:
+def _markov(table: Entries, network: Network, stop_time: float) -> Switching:
     active = _active(table, network)
     shortest = table.number("shortest")
     return markov_sequence(
@@ -107,7 +107,7 @@ def _markov(table: Table, network: Network, stop_time: float) -> Switching:
     )
 
 
-def _jointly_connected(table: Table, network: Network, stop_time: float) -> Switching:
+def _jointly_connected(table: Entries, network: Network, stop_time: float) -> Switching:
     return jointly_connected_sequence(
         network.agents,
         network.edges,
@@ -120,14 +120,14 @@ def _jointly_connected(table: Table, network: Network, stop_time: float) -> Swit
     )
 
 
-def _active(table: Table, network: Network) -> tuple[tuple[int, ...], ...]:
+def _active(table: Entries, network: Network) -> tuple[tuple[int, ...], ...]:
     """The graphs, checked before the lists that must be as long."""
     active = table.whole_number_lists("active")
     validate_active(active, len(network.edges))
     return active
 
 
-def _duration(table: Table, stop_time: float) -> float:
+def _duration(table: Entries, stop_time: float) -> float:
     duration = table.number("duration", default=stop_time)
     if duration < stop_time and not table.flag("repeat", default=False):
         raise table.error(
@@ -138,7 +138,7 @@ def _duration(table: Table, stop_time: float) -> float:
     return duration
 
 
-_READERS: dict[SwitchingKind, Callable[[Table, Network, float], Switching]] = {
+_READERS: dict[SwitchingKind, Callable[[Entries, Network, float], Switching]] = {
     SwitchingKind.PERIODIC: _periodic,
     SwitchingKind.SEQUENCE: _sequence,
     SwitchingKind.RANDOM_DWELL: _random_dwell,

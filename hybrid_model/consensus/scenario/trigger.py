@@ -5,18 +5,19 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.thresholds import mixed_threshold
+from hybrid_model.declare.variables import Value
 
-__all__ = ["Trigger", "TriggerKind", "trigger_keys"]
+__all__ = ["Threshold", "Trigger", "TriggerKind", "trigger_keys"]
 
 
 class TriggerKind(enum.Enum):
-    """The trigger laws; ``hybrid_model.consensus.laws.trigger_blocks`` makes an automaton of each."""
+    """The trigger laws; ``hybrid_model.consensus.laws.event_generators`` makes an automaton of each."""
 
     STATIC = "static"
     DYNAMIC = "dynamic"
@@ -45,36 +46,76 @@ class _Rule(enum.Enum):
         }[self]
 
 
-_THRESHOLD = {"threshold": _Rule.POSITIVE, "decay": _Rule.NOT_NEGATIVE}
-_KEYS: dict[TriggerKind, dict[str, _Rule]] = {
-    TriggerKind.STATIC: _THRESHOLD,
-    TriggerKind.DYNAMIC: _THRESHOLD,
-    TriggerKind.MIXED: {"offset": _Rule.POSITIVE, **_THRESHOLD},
-    TriggerKind.RELATIVE: {"sigma": _Rule.FRACTION, "floor": _Rule.POSITIVE, "decay": _Rule.NOT_NEGATIVE},
-    TriggerKind.GIRARD: {
-        "sigma": _Rule.FRACTION,
-        "theta": _Rule.POSITIVE,
-        "leak": _Rule.POSITIVE,
-        "reserve": _Rule.POSITIVE,
-    },
-    TriggerKind.SELF_TRIGGERED: _THRESHOLD,
-    TriggerKind.SAMPLED: {**_THRESHOLD, "period": _Rule.POSITIVE},
-    TriggerKind.PERIODIC: {"period": _Rule.POSITIVE},
-    TriggerKind.CONTINUOUS: {},
+@dataclass(frozen=True)
+class _Number:
+    """What a number of a law must be, and its value if it is not given; None: it must be given."""
+
+    rule: _Rule
+    default: float | None = None
+
+
+@dataclass(frozen=True)
+class _Law:
+    """The numbers of a law, and whether it compares ``|e|`` with a function of time alone."""
+
+    numbers: dict[str, _Number]
+    has_level: bool = False
+
+
+_POSITIVE = _Number(_Rule.POSITIVE)
+_SHARE = _Number(_Rule.FRACTION)
+_DECAY = _Number(_Rule.NOT_NEGATIVE)
+_NO_DECAY = _Number(_Rule.NOT_NEGATIVE, 0.0)
+
+_LAWS = {
+    TriggerKind.STATIC: _Law({"threshold": _POSITIVE, "decay": _NO_DECAY}, has_level=True),
+    TriggerKind.DYNAMIC: _Law({"threshold": _POSITIVE, "decay": _DECAY}, has_level=True),
+    TriggerKind.MIXED: _Law({"offset": _POSITIVE, "threshold": _POSITIVE, "decay": _DECAY}, has_level=True),
+    TriggerKind.RELATIVE: _Law({"sigma": _SHARE, "floor": _POSITIVE, "decay": _NO_DECAY}),
+    TriggerKind.GIRARD: _Law({"sigma": _SHARE, "theta": _POSITIVE, "leak": _POSITIVE, "reserve": _POSITIVE}),
+    TriggerKind.SELF_TRIGGERED: _Law({"threshold": _POSITIVE, "decay": _NO_DECAY}, has_level=True),
+    TriggerKind.SAMPLED: _Law({"threshold": _POSITIVE, "decay": _NO_DECAY, "period": _POSITIVE}, has_level=True),
+    TriggerKind.PERIODIC: _Law({"period": _POSITIVE}),
+    TriggerKind.CONTINUOUS: _Law({}),
 }
-_NO_DECAY_NEEDED = (TriggerKind.STATIC, TriggerKind.RELATIVE, TriggerKind.SELF_TRIGGERED, TriggerKind.SAMPLED)
-_WITH_LEVEL = (
-    TriggerKind.STATIC,
-    TriggerKind.DYNAMIC,
-    TriggerKind.MIXED,
-    TriggerKind.SELF_TRIGGERED,
-    TriggerKind.SAMPLED,
-)
 
 
 def trigger_keys(kind: TriggerKind) -> dict[str, float | None]:
     """Return the numbers of a law: name -> value if it is not given, None if it must be given."""
-    return {key: 0.0 if key == "decay" and kind in _NO_DECAY_NEEDED else None for key in _KEYS[kind]}
+    return {key: number.default for key, number in _LAWS[kind].numbers.items()}
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """The function of time that errors are compared with: ``c0 + c exp(-beta t)``.
+
+    Static with beta = c0 = 0, dynamic with c0 = 0 (paper, section 4), else mixed (Seyboth, Dimarogonas, Johansson,
+    Automatica 49 (2013) 245-252). The formula is stated here for runs, exports and bounds: it takes floats, arrays and
+    symbols.
+
+    Parameters
+    ----------
+    threshold : float, array or symbol
+        c, in the unit of the states.
+    decay : float, array or symbol
+        beta in 1/s.
+    offset : float, array or symbol
+        c0, in the unit of the states.
+    """
+
+    threshold: Value
+    decay: Value = 0.0
+    offset: Value = 0.0
+
+    def at(self, t: Value) -> Value:
+        """The threshold at the time `t` in s."""
+        return self.offset + self.threshold * np.exp(-self.decay * t)
+
+    @property
+    def exponentials(self) -> tuple[tuple[float, float], ...]:
+        """Pairs (c, beta) of the exponentials ``c exp(-beta t)`` that it is the sum of."""
+        decaying = (self.threshold, self.decay)
+        return ((self.offset, 0.0), decaying) if self.offset else (decaying,)
 
 
 @dataclass(frozen=True)
@@ -127,14 +168,14 @@ class Trigger:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        rules = _KEYS[self.kind]
+        numbers = _LAWS[self.kind].numbers
         for key in (field.name for field in fields(self) if field.name != "kind"):
             value = getattr(self, key)
             if not math.isfinite(value):
                 raise ScenarioError(f"[trigger] {key} is {value}; it must be a finite number.")
-            if key in rules and not rules[key].holds(value):
-                raise ScenarioError(f"[trigger] {key} is {value}; it {rules[key].value}.")
-            if key not in rules and value != 0.0:
+            if key in numbers and not numbers[key].rule.holds(value):
+                raise ScenarioError(f"[trigger] {key} is {value}; it {numbers[key].rule.value}.")
+            if key not in numbers and value != 0.0:
                 raise ScenarioError(
                     f"[trigger] {key} is {value}, but the trigger '{self.kind.value}' has no {key}; leave it out."
                 )
@@ -145,16 +186,25 @@ class Trigger:
             )
 
     @property
+    def numbers(self) -> dict[str, Any]:
+        """The numbers of the law, by name."""
+        return {key: getattr(self, key) for key in _LAWS[self.kind].numbers}
+
+    @property
     def has_level(self) -> bool:
         """Whether the law compares ``|e|`` with a function of time, which is then `level`."""
-        return self.kind in _WITH_LEVEL
+        return _LAWS[self.kind].has_level
 
     def level(self, t: ArrayLike) -> NDArray[np.float64]:
         """The threshold of ``|e|`` at time `t` [s]; ScenarioError if the law has none."""
         if not self.has_level:
             raise ScenarioError(
                 f"the trigger '{self.kind.value}' compares the error with no function of time alone; laws that do are "
-                f"{', '.join(kind.value for kind in _WITH_LEVEL)}."
+                f"{', '.join(kind.value for kind, law in _LAWS.items() if law.has_level)}."
             )
-        time = np.asarray(t, dtype=float)
-        return np.asarray(mixed_threshold(self.offset, self.threshold, self.decay, time))
+        return np.asarray(self.threshold_in_time.at(np.asarray(t, dtype=float)))
+
+    @property
+    def threshold_in_time(self) -> Threshold:
+        """The threshold of laws that have one."""
+        return Threshold(self.threshold, self.decay, self.offset)

@@ -1,16 +1,95 @@
-"""The gate ``square(rate*t - phase, duty_percent)`` as data: its segments, its instants, integrals while it is open."""
+"""The gate ``square(rate*t - phase, duty_percent)``: segments, integrals while it is open, its clock in runs."""
 
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import hybrid_model as hm
 from hybrid_model.consensus.weights.carriers import Carrier
-from hybrid_model.consensus.weights.clockwork import gate_boundary, gate_segment
+from hybrid_model.consensus.weights.clockwork import holding, is_odd
+from hybrid_model.consensus.weights.edge_automata import PIECE_EVENTS, ForeseenWeights
 from hybrid_model.consensus.weights.waveform import require, require_phase
+from hybrid_model.declare.variables import Value
 
-__all__ = ["Gate"]
+__all__ = ["Gate", "GateClock", "gate_boundary", "gate_segment", "is_open"]
+
+
+def gate_segment(t: Value, rate: Value, phase: Value, duty_percent: Value) -> Value:
+    """Index of the on- or off-segment of the gate ``square(rate*t - phase, duty_percent)`` that holds `t`.
+
+    On-window ``m`` starts at ``(phase + 2*pi*m)/rate`` and lasts ``2*pi*duty_percent/100/rate``; ``m`` may be negative.
+
+    Parameters
+    ----------
+    t : float, array or symbol
+        Time [s].
+    rate : float
+        Angular rate of the gate [rad/s].
+    phase : float
+        Phase [rad].
+    duty_percent : float
+        Share of each period during which the gate is open, 0 to 100 [%].
+
+    Returns
+    -------
+    float, array or symbol
+        ``2*m`` inside on-window ``m``, ``2*m + 1`` after it. With a duty of 0 there are only odd segments, with a duty
+        of 100 only even ones.
+
+    Notes
+    -----
+    ``square(a*t, b)`` is the paper's section 7: +1 for the first ``b`` percent of each period ``2*pi/a``, then -1.
+    """
+    window = holding(
+        t,
+        np.floor((t * rate - phase) / (2 * np.pi)),
+        lambda m: gate_boundary(2 * m + 1, rate, phase, duty_percent),
+    )
+    is_over = np.where(t >= gate_boundary(2 * window, rate, phase, duty_percent), 1.0, 0.0)
+    return 2 * window + is_over
+
+
+def gate_boundary(k: Value, rate: Value, phase: Value, duty_percent: Value) -> Value:
+    """End time [s] of segment `k` of the gate; see `gate_segment` for the parameters.
+
+    The end of an off-segment is computed as ``(phase + 2*pi*(m + 1))/rate``. With ``rate = 4`` and ``phase = 0`` the
+    division is exact, so a dwell of ``pi`` or ``pi/2`` meets the gate at the same floating-point number.
+    """
+    share = is_odd(k) + (1 - is_odd(k)) * (duty_percent / 100)
+    return (phase + 2 * np.pi * (np.floor(k / 2) + share)) / rate
+
+
+def is_open(segment: Value) -> Value:
+    """1 in segments in which the gate is open, else 0."""
+    return 1 - is_odd(segment)
+
+
+class GateClock(ForeseenWeights):
+    """Weights with gates, one for each edge, each with the index of its present segment."""
+
+    segment = hm.DiscreteState(
+        0, shape="degree", integer=True, internal=True, computed=True, description="segment of the gate: even is on"
+    )
+    gate_rate = hm.Parameter(4.0, shape="degree", unit="rad/s", description="rate of the gate")
+    duty_percent = hm.Parameter(
+        20.0, shape="degree", minimum=0.0, maximum=100.0, description="share of each gate period that is on, in percent"
+    )
+    phase = hm.Parameter(0.0, shape="degree", unit="rad", description="phase of the gate")
+    pieces: ClassVar[tuple[str, ...]] = ("segment",)
+    transitions: ClassVar[tuple[hm.Jump | hm.TimeEvent, ...]] = PIECE_EVENTS
+
+    def pieces_at(self, s: hm.Values) -> dict[str, Value]:
+        """The segments that hold the present time."""
+        return {"segment": gate_segment(s.t, s.gate_rate, s.phase, s.duty_percent)}
+
+    def piece_end(self, s: hm.Values, pieces: Mapping[str, Value]) -> Value:
+        """Time at which the first gate switches."""
+        return np.min(gate_boundary(pieces["segment"], s.gate_rate, s.phase, s.duty_percent))
 
 
 @dataclass(frozen=True)
@@ -44,10 +123,6 @@ class Gate:
     def boundary(self, k: Any) -> Any:
         """End time [s] of segment `k`."""
         return gate_boundary(k, self.rate, self.phase, self.duty_percent)
-
-    def is_open(self, t: ArrayLike) -> NDArray[np.float64]:
-        """1 where the gate is open at `t` [s], else 0."""
-        return np.asarray(1.0 - self.segment(np.asarray(t, dtype=float)) % 2)
 
     def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
         """Instants strictly between `t0` and `t1` [s] at which the gate opens or closes; none if it never does."""

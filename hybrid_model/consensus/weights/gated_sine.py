@@ -1,101 +1,106 @@
-"""Weights of edges as functions of time: value, breakpoints, exact integral, period.
+"""The paper's weights: a sine behind a gate, squared or in absolute value (paper, section 7; audit, section 9)."""
 
-A weight is a piecewise-constant amplitude times a carrier, ``w(t) = amplitude(t)*carrier(t)``. Edges whose carriers are
-equal share one shape; on such a piece the weighted Laplacian is a constant matrix times a scalar, and the flow of the
-consensus dynamics is a matrix exponential of a closed-form integral.
-"""
+from __future__ import annotations
 
+import enum
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid_model.consensus.weights.carriers import Carrier, SineCarrier, UnitCarrier, WeightMap, apply_map
-from hybrid_model.consensus.weights.clockwork import (
-    gate_boundary,
-    gate_segment,
-    gated_sine,
-    half_wave,
-    half_wave_boundary,
-)
-from hybrid_model.consensus.weights.gate import Gate
+import hybrid_model as hm
+from hybrid_model.consensus.entries import Entries
+from hybrid_model.consensus.weights.clockwork import half_wave, half_wave_boundary
+from hybrid_model.consensus.weights.gate import Gate, GateClock, is_open
 from hybrid_model.consensus.weights.periods import common_period
-from hybrid_model.consensus.weights.waveform import ALWAYS, Waveform, require
+from hybrid_model.consensus.weights.waveform import Waveform, each_edge, require
+from hybrid_model.declare.variables import Value
 
-__all__ = [
-    "Carrier",
-    "ConstantWeight",
-    "GatedSine",
-    "SineCarrier",
-    "UnitCarrier",
-    "Waveform",
-    "WeightMap",
-    "apply_map",
-    "gate_boundary",
-    "gate_segment",
-    "gated_sine",
-    "half_wave",
-    "half_wave_boundary",
-]
+__all__ = ["GatedAbsoluteSineWeights", "GatedSine", "GatedSineWeights", "SineCarrier", "WeightMap"]
+
+
+class WeightMap(enum.Enum):
+    """How a signed signal g becomes a weight w >= 0 (audit, section 9: w = g itself is not admissible)."""
+
+    SQUARE = "square"
+    ABS = "abs"
 
 
 @dataclass(frozen=True)
-class ConstantWeight:
-    """A weight that does not change: ``w(t) = level``.
+class SineCarrier:
+    """The open-gate shape ``4*sin(rate*t)**2`` or ``2*|sin(rate*t)|``; `rate` in rad/s."""
 
-    Parameters
-    ----------
-    level : float
-        The weight, finite and not negative.
+    rate: Value
+    map: WeightMap
 
-    Raises
-    ------
-    ValueError
-        If the level is negative or not finite.
+    @property
+    def steepness(self) -> Value:
+        """``4*rate`` or ``2*rate``."""
+        return (4.0 if self.map is WeightMap.SQUARE else 2.0) * self.rate
+
+    def value(self, t: Value) -> Value:
+        """Value at time `t` [s], the gate being open."""
+        wave = 2 * np.sin(self.rate * t)
+        return wave**2 if self.map is WeightMap.SQUARE else np.abs(wave)
+
+    def integral(self, t0: Value, t1: Value) -> Value:
+        """Integral from `t0` to `t1` [s] in closed form, without cancellation between two large primitives."""
+        if self.map is WeightMap.SQUARE:
+            wave = np.cos(self.rate * (t0 + t1)) * np.sin(self.rate * (t1 - t0))
+            return 2 * (t1 - t0) - 2 / self.rate * wave
+        # Each half wave of 2|sin| has the area 4/rate; the difference of the cosines of the angles within their half
+        # waves is written as a product.
+        h0, h1 = half_wave(t0, self.rate), half_wave(t1, self.rate)
+        middle = self.rate * (t0 + t1) / 2 - np.pi * (h0 + h1) / 2
+        half = self.rate * (t1 - t0) / 2 - np.pi * (h1 - h0) / 2
+        return 4 / self.rate * ((h1 - h0) + np.sin(middle) * np.sin(half))
+
+
+class GatedSineWeights(GateClock):
+    """The paper's weights ``w = g**2`` with ``g = (square(gate_rate t - phase, duty) + 1) sin(sine_rate t)``.
+
+    Using the segment index instead of comparing times keeps the value of a segment right up to and including its end,
+    where an integrator evaluates it. Source: paper, section 7; audit, section 9 for the reading ``g**2``.
     """
 
-    level: float
+    sine_rate = hm.Parameter(5.0, shape="degree", unit="rad/s", description="rate of the sine")
+    weight_map = WeightMap.SQUARE
 
-    def __post_init__(self) -> None:
-        """Check the values."""
-        require("the constant weight", self.level, self.level >= 0, "must not be negative")
+    def amplitude(self, s: hm.Values, pieces: Mapping[str, Value]) -> Value:
+        """1 while the gate is open, else 0."""
+        return is_open(pieces["segment"])
 
-    @property
-    def carrier(self) -> UnitCarrier:
-        """The carrier 1."""
-        return UnitCarrier()
+    def carrier(self, s: hm.Values) -> SineCarrier:
+        """The sine, squared or in absolute value."""
+        return SineCarrier(s.sine_rate, self.weight_map)
 
-    @property
-    def period(self) -> float:
-        """0.0: every number is a period of a constant."""
-        return 0.0
 
-    @property
-    def domain(self) -> tuple[float, float]:
-        """All times."""
-        return ALWAYS
+class GatedAbsoluteSineWeights(GatedSineWeights):
+    """The alternative reading ``w = |g|`` (audit, section 9); its kinks at the sine's zeros are breakpoints too."""
 
-    def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The level, in the shape of `t` [s]."""
-        return np.full(np.shape(t), float(self.level))
+    half_wave = hm.DiscreteState(
+        0, shape="degree", integer=True, internal=True, computed=True, description="half wave of the sine"
+    )
+    weight_map = WeightMap.ABS
+    pieces = ("segment", "half_wave")
 
-    def value(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The level, in the shape of `t` [s]."""
-        return self.amplitude(t)
+    def pieces_at(self, s: hm.Values) -> dict[str, Value]:
+        """The segments and the half waves that hold the present time."""
+        return {**super().pieces_at(s), "half_wave": half_wave(s.t, s.sine_rate)}
 
-    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
-        """None: an empty array."""
-        return np.empty(0)
-
-    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
-        """``level*(t1 - t0)``; times in seconds."""
-        return self.level * self.carrier.integral(t0, t1)
+    def piece_end(self, s: hm.Values, pieces: Mapping[str, Value]) -> Value:
+        """Time at which a gate switches or a sine is zero."""
+        zero = np.min(half_wave_boundary(pieces["half_wave"], s.sine_rate))
+        return np.minimum(super().piece_end(s, pieces), zero)
 
 
 @dataclass(frozen=True)
-class GatedSine:
+class GatedSine(Waveform):
     """The weight ``w = g**2`` or ``|g|`` of ``g = (square(gate_rate*t - phase, duty_percent) + 1)*sin(sine_rate*t)``.
 
     Parameters
@@ -124,6 +129,13 @@ class GatedSine:
     duty_percent: float
     phase: float = 0.0
     map: WeightMap = WeightMap.SQUARE
+    numbers: ClassVar[Mapping[str, float | None]] = {
+        "gate_rate": None,
+        "sine_rate": None,
+        "duty_percent": None,
+        "phase": 0.0,
+    }
+    further_keys: ClassVar[tuple[str, ...]] = ("map",)
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -141,6 +153,11 @@ class GatedSine:
         return SineCarrier(self.sine_rate, self.map)
 
     @property
+    def automaton(self) -> type[GatedSineWeights]:
+        """One for each map."""
+        return GatedSineWeights if self.map is WeightMap.SQUARE else GatedAbsoluteSineWeights
+
+    @property
     def period(self) -> float | None:
         """A period [s] of the weight, 0.0 if it is zero throughout, None if gate and sine are not commensurable.
 
@@ -153,19 +170,9 @@ class GatedSine:
             return carrier_period
         return common_period((2 * math.pi / self.gate_rate, carrier_period))
 
-    @property
-    def domain(self) -> tuple[float, float]:
-        """All times."""
-        return ALWAYS
-
     def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
         """1 where the gate is open at `t` [s], else 0."""
-        return self.gate.is_open(t)
-
-    def value(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The weight at `t` [s], in the shape of `t`."""
-        time = np.asarray(t, dtype=float)
-        return np.asarray(apply_map(gated_sine(time, self.gate.segment(time), self.sine_rate), self.map))
+        return np.asarray(is_open(self.gate.segment(np.asarray(t, dtype=float))))
 
     def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
         """Times strictly between `t0` and `t1` [s], ascending, at which the weight jumps or has a kink.
@@ -184,3 +191,10 @@ class GatedSine:
     def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
         """Exact integral of the weight from `t0` to `t1` [s]; the two broadcast against each other."""
         return self.gate.integral(self.carrier, t0, t1)
+
+    @classmethod
+    def read(cls, entries: Entries, edges: int, folder: Path) -> tuple[Self, ...]:
+        """See `Waveform.read`."""
+        weight_map = entries.choice("map", WeightMap, default=WeightMap.SQUARE)
+        columns = [entries.per_edge(key, edges, default) for key, default in cls.numbers.items()]
+        return each_edge(cls, zip(*columns, (weight_map,) * edges, strict=True))

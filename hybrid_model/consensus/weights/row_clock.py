@@ -2,7 +2,7 @@
 
 Rows have numbers ``k = cycle*rows + row``; row `row` of cycle `cycle` begins at ``starts[row] + cycle*period``. A
 period of 0 stands for a table that does not repeat: there is one cycle, its last row has no end, and its first row
-holds all times before it as well. `row_number`, `row_begin` and `row_place` are written for floats and for symbols
+holds all times before it as well. `row_number`, `row_begin` and `on_line` are written for floats and for symbols
 alike; a time that equals a computed beginning bit for bit lies in the row that begins.
 """
 
@@ -14,37 +14,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid_model.consensus.weights.clockwork import Expression
+import hybrid_model as hm
+from hybrid_model.consensus.weights.clockwork import holding, in_turn, not_negative
 from hybrid_model.consensus.weights.waveform import require
+from hybrid_model.declare.variables import Value
 
-__all__ = ["RowClock", "check_rows", "row_begin", "row_number", "row_place"]
+__all__ = ["RowAutomaton", "RowClock", "check_rows", "on_line", "row_begin", "row_number"]
 
 
-def row_number(t: Expression, starts: Expression, period: Expression) -> Expression:
+def row_number(t: Value, starts: Value, period: Value) -> Value:
     """Number of the row that holds the scalar time `t` [s] in a table with beginnings `starts`, shape (rows,) [s]."""
     rows = starts.shape[0]
     repeats = np.where(period > 0, 1.0, 0.0)
     step = np.where(period > 0, period, 1.0)
-    guess = np.floor((t - starts[0]) / step)
-    late = np.where(t >= starts[0] + (guess + 1) * step, 1.0, 0.0)
-    early = np.where(t < starts[0] + guess * step, 1.0, 0.0)
-    cycle = repeats * (guess + late - early)
+    cycle = repeats * holding(t, np.floor((t - starts[0]) / step), lambda k: starts[0] + (k + 1) * step)
     begun = np.sum(np.where(t >= starts + cycle * period, 1.0, 0.0))
     return cycle * rows + np.maximum(begun - 1, 0.0)
 
 
-def row_place(k: Expression, starts: Expression) -> Expression:
-    """Place, from 0, of row number `k` in its table."""
-    rows = starts.shape[0]
-    return k - rows * np.floor(k / rows)
-
-
-def row_begin(k: Expression, starts: Expression, period: Expression) -> Expression:
+def row_begin(k: Value, starts: Value, period: Value) -> Value:
     """Time [s] at which row number `k` begins; infinity behind the last row of a table that does not repeat."""
     rows = starts.shape[0]
     cycle = np.floor(k / rows)
-    begin = np.sum(np.where(np.arange(rows) == row_place(k, starts), starts, 0.0)) + cycle * period
+    begin = in_turn(k, rows) @ starts + cycle * period
     return np.where(np.where(period > 0, 0.0, k) >= rows, np.inf, begin)
+
+
+def on_line(value: Value, slope: Value, since: Value, t: Value) -> Value:
+    """What runs straight from `value` at the time `since`, but stays before it and never falls below 0."""
+    return not_negative(value + slope * np.maximum(t - since, 0.0))
 
 
 def check_rows(starts: tuple[float, ...], period: float | None, names: tuple[str, str] = ("starts", "period")) -> None:
@@ -148,3 +146,34 @@ class RowClock:
         place, within = number % self.rows, time - self.begin(number)
         inside = within * (levels[place] + slopes[place] * np.maximum(within, 0.0) / 2)
         return np.asarray((number // self.rows) * before[-1] + before[place] + inside)
+
+
+class RowAutomaton(hm.HybridAutomaton):
+    """Goes through the rows of a table, over and over or once; subclasses say what they hold of a row.
+
+    What is held is a discrete state, so the flow between two rows costs no search through the table.
+    """
+
+    rows = hm.Dimension("number of rows of the table")
+    row = hm.DiscreteState(0, integer=True, internal=True, computed=True, description="number of the row in force")
+    starts = hm.Parameter(0.0, shape="rows", unit="s", description="times at which the rows begin for the first time")
+    period = hm.Parameter(0.0, unit="s", description="time after which the rows repeat; 0 if the last one stays")
+
+    def held(self, row: Value, s: hm.Values) -> dict[str, Value]:
+        """The values that are held while row number `row` is in force."""
+        return {}
+
+    def start_map(self, s: hm.Values) -> dict[str, Value]:
+        """The row that holds the start time."""
+        row = row_number(s.t, s.starts, s.period)
+        return {"row": row, **self.held(row, s)}
+
+    def next_row(self, s: hm.Values) -> Value:
+        """Time at which the next row begins; infinity if there is none."""
+        return row_begin(s.row + 1, s.starts, s.period)
+
+    def move_on(self, s: hm.Values) -> dict[str, Value]:
+        """Go on to the next row."""
+        return {"row": s.row + 1, **self.held(s.row + 1, s)}
+
+    transitions = (hm.TimeEvent("row", next_row, move_on, internal=True),)

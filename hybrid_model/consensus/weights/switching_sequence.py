@@ -1,20 +1,44 @@
 """A list of graphs, each with its own dwell time, that repeats or ends with the run."""
 
+from __future__ import annotations
+
 import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_model.consensus.weights.row_clock import RowClock
+import hybrid_model as hm
+from hybrid_model.consensus.weights.clockwork import in_turn
+from hybrid_model.consensus.weights.row_clock import RowAutomaton, RowClock
+from hybrid_model.consensus.weights.switching import Switching, SwitchingAutomaton, masks, validate_active
 from hybrid_model.consensus.weights.waveform import ALWAYS, require
+from hybrid_model.declare.variables import Value
 
-__all__ = ["SwitchingSequence", "validate_active"]
+__all__ = ["SequenceSwitching", "SwitchingSequence"]
+
+
+class SequenceSwitching(RowAutomaton, SwitchingAutomaton):
+    """Edges that are active row by row of a table, each row for its own time (paper, section 6)."""
+
+    active = hm.Parameter(1.0, shape=("rows", "degree"), description="1 where an edge is active in a graph, else 0")
+    mask = hm.DiscreteState(
+        0.0, shape="degree", internal=True, computed=True, description="1 where an edge is active now, else 0"
+    )
+
+    def held(self, row: Value, s: hm.Values) -> dict[str, Value]:
+        """The active edges."""
+        return {"mask": in_turn(row, s.starts.shape[0]) @ s.active}
+
+    def outputs(self, s: hm.Values) -> dict[str, Value]:
+        """The weights of the active edges."""
+        return {"weights": s.mask * s.raw}
 
 
 @dataclass(frozen=True)
-class SwitchingSequence:
+class SwitchingSequence(Switching):
     """Switching along a list: first the edges ``active[0]`` for the time ``dwells[0]``, then the next; from t = 0.
 
     Parameters
@@ -92,14 +116,14 @@ class SwitchingSequence:
         masks.setflags(write=False)
         return masks
 
+    def automaton(self, edges: Sequence[int]) -> SequenceSwitching | None:
+        """See `Switching.automaton`."""
+        if not edges:
+            return None
+        starts, period = self.clock.starts, self.clock.period or 0.0
+        return SequenceSwitching(starts=starts, period=period, active=masks(self.active, edges))
 
-def validate_active(active: tuple[tuple[int, ...], ...], edge_count: int) -> None:
-    """Check a list of graphs, each a list of edge numbers; ValueError that names the first wrong one."""
-    if not active:
-        raise ValueError("active is empty; it must list the active edges of at least one phase.")
-    for number, edges in enumerate(active, start=1):
-        for edge in edges:
-            if not 1 <= edge <= edge_count:
-                raise ValueError(f"active phase {number} names edge {edge}; edges are numbered from 1 to {edge_count}.")
-        if len(set(edges)) < len(edges):
-            raise ValueError(f"active phase {number} is {list(edges)}; each edge may be listed only once.")
+    def changes(self, end: float) -> Iterator[tuple[str, float]]:
+        """See `Switching.changes`."""
+        if self.repeat:
+            yield "duration or dwell", end / self.duration * len(self.dwells)

@@ -18,9 +18,10 @@ from hybrid_model.consensus.excitation.persistence import (
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
-from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching
+from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
+from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
 
 PUBLISHED = 1e-6  # the reference values are given with six decimals
 
@@ -109,14 +110,14 @@ class TestWindows:
 
     def test_rotating_excitation_attains_the_factor_p(self):
         # Audit, section 5.1: M = e_i e_i^T on the i-th third of the window; the integrated norm is p times mu2.
-        weights = EdgeWeights((ConstantWeight(2.0),) * 3, PeriodicSwitching(1.0, ((1,), (2,), (3,)), 3))
+        weights = EdgeWeights((ConstantWeight(2.0),) * 3, SwitchingCycle(1.0, ((1,), (2,), (3,)), 3))
         constants = excitation_constants(np.eye(3), weights)
         assert constants.window == 3.0
         assert (constants.mu1, constants.mu2, constants.mu2_bar) == pytest.approx((2.0, 2.0, 6.0))
 
     def test_a_single_gate_has_its_extremes_where_the_hand_finds_them(self):
         # Weight 1 on [0, 1), 0 on [1, 2), window 1.5: at worst .5 of it is on, at best 1.
-        weights = EdgeWeights((ConstantWeight(1.0),), PeriodicSwitching(1.0, ((1,), ()), 1))
+        weights = EdgeWeights((ConstantWeight(1.0),), SwitchingCycle(1.0, ((1,), ()), 1))
         constants = excitation_constants(np.ones((1, 1)), weights, window=1.5)
         assert constants.mu1 == pytest.approx(0.5, abs=1e-12)
         assert constants.mu2 == pytest.approx(1.0, abs=1e-12)

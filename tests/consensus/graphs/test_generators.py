@@ -29,7 +29,8 @@ from hybrid_model.consensus.weights.connectivity import (
     union_edges,
 )
 from hybrid_model.consensus.weights.random_switching import random_dwell_sequence
-from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching, SwitchingSequence
+from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
+from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
 
 ROUNDING = 1e-10  # eigenvalues of matrices of size <= 9 with entries of order 1
 
@@ -186,7 +187,7 @@ RING = ((1, 2), (2, 3), (3, 4), (4, 1))
 
 
 def test_union_of_switching_graphs():
-    switching = PeriodicSwitching(2.0, ((1,), (2, 3), ()), 4)
+    switching = SwitchingCycle(2.0, ((1,), (2, 3), ()), 4)
     assert union_edges(switching, 0.0, 1.0) == (1,)
     assert union_edges(switching, 1.0, 2.5) == (1, 2, 3)
     assert union_edges(switching, 4.0, 6.0) == ()
@@ -195,9 +196,9 @@ def test_union_of_switching_graphs():
 
 def test_window_of_joint_connectivity():
     # From t = 0 the union is complete when the second graph begins, at 2 s; from 2 s when the first comes back, at 6 s.
-    assert joint_connectivity_window(4, RING, PeriodicSwitching(2.0, ((1,), (2, 3), ()), 4)) == pytest.approx(4.0)
+    assert joint_connectivity_window(4, RING, SwitchingCycle(2.0, ((1,), (2, 3), ()), 4)) == pytest.approx(4.0)
     assert joint_connectivity_window(4, RING, NoSwitching(4)) == 0.0
-    assert joint_connectivity_window(4, RING, PeriodicSwitching(2.0, ((1,), (2,)), 4)) is None
+    assert joint_connectivity_window(4, RING, SwitchingCycle(2.0, ((1,), (2,)), 4)) is None
     listed = SwitchingSequence((1.0, 0.5, 3.0, 0.25), ((1,), (2,), (3,), (1, 2, 3)), 4)
     # Waits from 0, 1, 1.5 and 4.5 s: 1.5, 3.5, 3.0 and 0.
     assert joint_connectivity_window(4, RING, listed, horizon=4.75) == pytest.approx(3.5)

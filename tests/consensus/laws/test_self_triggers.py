@@ -15,11 +15,13 @@ import hybrid_model as hm
 from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
-from hybrid_model.consensus.laws.forecast import Forecast, Wave
+from hybrid_model.consensus.laws.forecast import Forecast
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
-from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
+from hybrid_model.consensus.scenario.trigger import Threshold, Trigger, TriggerKind
+from hybrid_model.consensus.weights.gated_sine import SineCarrier, WeightMap
+from hybrid_model.consensus.weights.sine import RippleCarrier
 from hybrid_model.native.compiled import compiled
 
 TIME_TOLERANCE = 1e-8
@@ -149,26 +151,34 @@ def test_weights_whose_future_is_not_known_in_closed_form_are_refused():
 
 
 @settings(max_examples=60, deadline=None)
-@given(seed=SEEDS)
-def test_the_forecast_finds_the_first_meeting(seed):
+@given(
+    seed=SEEDS,
+    make=st.sampled_from(
+        [
+            RippleCarrier,
+            lambda depth, rate, phase: SineCarrier(rate, WeightMap.SQUARE),
+            lambda depth, rate, phase: SineCarrier(rate, WeightMap.ABS),
+        ]
+    ),
+)
+def test_the_forecast_finds_the_first_meeting(seed, make):
     """Against a fine table and bracketing; a search that is still open is taken up again from where it got to."""
     rng = np.random.default_rng(seed)
     count = int(rng.integers(1, 4))
     mean, angle = rng.uniform(0.5, 2.0, count), rng.uniform(0.0, 2.0 * np.pi, count)
-    swing = mean * rng.uniform(0.0, 1.0, count)  # weights are not negative
-    wave = Wave(mean, swing * np.cos(angle), swing * np.sin(angle), rate=rng.uniform(0.5, 8.0, count))
-    pull, decay, threshold = rng.uniform(-1.0, 1.0, count), rng.uniform(0.0, 1.0), 0.5
+    carrier = make(rng.uniform(0.0, 1.0, count), rng.uniform(0.5, 8.0, count), angle)
+    pull, threshold = mean * rng.uniform(-1.0, 1.0, count), Threshold(0.5, rng.uniform(0.0, 1.0))
     since, end = 1.3, 1.3 + rng.uniform(0.5, 5.0)
-    error = rng.uniform(-0.9, 0.9) * threshold * np.exp(-decay * since)
-    found = Forecast(wave, pull, error, since, threshold, decay, 1.0)
+    error = rng.uniform(-0.9, 0.9) * threshold.at(since)
+    found = Forecast(carrier, pull, error, since, threshold, 1.0)
     meeting, reached = found.first_meeting(end), since
     while meeting.open:
         assert meeting.t > reached
         reached = meeting.t
-        meeting = Forecast(wave, pull, found.error(reached), reached, threshold, decay, 1.0).first_meeting(end)
+        meeting = Forecast(carrier, pull, found.error(reached), reached, threshold, 1.0).first_meeting(end)
 
     def margin(t):
-        return abs(found.error(t)) - threshold * np.exp(-decay * t)
+        return abs(found.error(t)) - threshold.at(t)
 
     times = np.linspace(since, end, 2000)
     risen = np.flatnonzero(np.array([margin(t) for t in times]) >= 0)

@@ -8,13 +8,17 @@ import pytest
 
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.definition import Scenario, WeightKind, Weights
+from hybrid_model.consensus.scenario.definition import Scenario, Weights
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
-from hybrid_model.consensus.weights.functions import FunctionWeight
+from hybrid_model.consensus.weights.function import FunctionWeight
 from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
-from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching, SwitchingSequence
-from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
-from hybrid_model.consensus.weights.waves import SineWeight, SquareWeight
+from hybrid_model.consensus.weights.kinds import WeightKind
+from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
+from hybrid_model.consensus.weights.sampled import SampledWeight
+from hybrid_model.consensus.weights.sine import SineWeight
+from hybrid_model.consensus.weights.square import SquareWeight
+from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
+from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
 
 BASE = {
     "name": "three",
@@ -122,7 +126,7 @@ class TestWeights:
 class TestSwitching:
     def test_the_kind_may_be_left_out_or_said(self):
         plain = {"dwell": 2.0, "active": [[1], [2]]}
-        expected = PeriodicSwitching(2.0, ((1,), (2,)), 2)
+        expected = SwitchingCycle(2.0, ((1,), (2,)), 2)
         assert scenario(switching=plain).switching == expected
         assert scenario(switching={"kind": "periodic", **plain}).switching == expected
 

@@ -9,11 +9,13 @@ import pytest
 from hybrid_model.consensus.graphs.undirected import complete_edges
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.definition import Underlying, WeightKind, replace_trigger
+from hybrid_model.consensus.scenario.definition import Underlying, replace_trigger
 from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
-from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching
+from hybrid_model.consensus.weights.constant import ConstantWeight
+from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
+from hybrid_model.consensus.weights.kinds import WeightKind
+from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
 
 VALID = {
     "name": "three",
@@ -53,7 +55,7 @@ class TestPresets:
         for waveform, duty in zip(scenario.weights.waveforms, duties, strict=True):
             assert waveform.duty_percent == pytest.approx(duty, rel=1e-15)
             assert waveform == GatedSine(4.0, 5.0, waveform.duty_percent, 0.0, WeightMap.SQUARE)
-        assert scenario.switching == PeriodicSwitching(math.pi, ((1, 2, 3), (2, 3, 4)), 4)
+        assert scenario.switching == SwitchingCycle(math.pi, ((1, 2, 3), (2, 3, 4)), 4)
         assert scenario.trigger == Trigger(TriggerKind.DYNAMIC, 0.5, 0.06)
 
     def test_both_triggers_have_a_name(self):

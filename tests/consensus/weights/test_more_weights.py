@@ -11,17 +11,19 @@ from own_importer import Exchange, Importer
 from scipy.integrate import quad
 
 import hybrid_model as hm
-from hybrid_model.consensus.laws.forecast import Wave
-from hybrid_model.consensus.weights.blocks import weights_block
 from hybrid_model.consensus.weights.carriers import UnitCarrier
-from hybrid_model.consensus.weights.clockwork import half_wave_boundary
+from hybrid_model.consensus.weights.distances import distance_weights, reliability_weight
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
-from hybrid_model.consensus.weights.functions import FunctionWeight, distance_weights, reliability_weight
+from hybrid_model.consensus.weights.function import FunctionWeight
+from hybrid_model.consensus.weights.kinds import weights_block
+from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
 from hybrid_model.consensus.weights.row_clock import RowClock, row_begin, row_number
-from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingSequence
-from hybrid_model.consensus.weights.tables import PiecewiseWeight, SampledWeight
+from hybrid_model.consensus.weights.sampled import SampledWeight
+from hybrid_model.consensus.weights.sine import SineWeight
+from hybrid_model.consensus.weights.square import SquareWeight
+from hybrid_model.consensus.weights.switching import NoSwitching
+from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
 from hybrid_model.consensus.weights.waveform import Waveform
-from hybrid_model.consensus.weights.waves import SineWeight, SquareWeight
 from hybrid_model.native.compiled import compiled
 
 rates = st.floats(0.05, 20.0)
@@ -200,13 +202,6 @@ class TestNeverNegative:
                 exchange.iterate()
         assert len(found) == 57  # 28 whole periods, and one row more
         assert min(found) == 0.0
-
-    @given(rate=rates, h=st.integers(0, 3000))
-    def test_the_forecast_of_a_half_wave_at_its_end(self, rate, h):
-        # 2|sin| on one half wave is sign*2*sin, which rounding lets cross zero at the wave's end.
-        sign, zero = 1.0 - 2.0 * (h % 2), 0.0 * rate
-        wave = Wave(zero, zero, 2.0 * sign, rate)
-        assert wave.value(half_wave_boundary(float(h), rate)) >= 0
 
 
 class TestByHand:

@@ -8,18 +8,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
-from hybrid_model.consensus.weights.gated_sine import ConstantWeight, GatedSine, WeightMap
-from hybrid_model.consensus.weights.switching import NoSwitching, PeriodicSwitching
+from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
+from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
 
-TWO_TREES = PeriodicSwitching(math.pi, ((1, 2, 3), (2, 3, 4)), 4)
+TWO_TREES = SwitchingCycle(math.pi, ((1, 2, 3), (2, 3, 4)), 4)
 MIXED = EdgeWeights(
     (
         GatedSine(4.0, 5.0, 35.0, phase=0.3),
         GatedSine(4.0, 3.0, 60.0, map=WeightMap.ABS),
         ConstantWeight(0.7),
     ),
-    PeriodicSwitching(1.1, ((1, 2), (), (2, 3)), 3),
+    SwitchingCycle(1.1, ((1, 2), (), (2, 3)), 3),
 )
 
 
@@ -32,7 +33,7 @@ def test_phases_cycle_and_begin_at_their_instants():
 @given(j=st.integers(0, 10_000), dwell=st.floats(0.01, 100))
 @settings(max_examples=200)
 def test_a_computed_switching_instant_begins_the_next_phase(j, dwell):
-    switching = PeriodicSwitching(dwell, ((1,), (2,), ()), 2)
+    switching = SwitchingCycle(dwell, ((1,), (2,), ()), 2)
     assert switching.phase(j * dwell) == j % 3
 
 
@@ -44,7 +45,7 @@ def test_breakpoints_are_strictly_inside():
 
 def test_periods():
     assert TWO_TREES.period == 2 * math.pi
-    assert PeriodicSwitching(1.0, ((1, 2), (2, 1)), 2).period == 0.0
+    assert SwitchingCycle(1.0, ((1, 2), (2, 1)), 2).period == 0.0
     assert NoSwitching(2).period == 0.0
 
 
@@ -61,7 +62,7 @@ def test_periods():
 )
 def test_bad_values_are_named(arguments, message):
     with pytest.raises(ValueError, match=message):
-        PeriodicSwitching(*arguments)
+        SwitchingCycle(*arguments)
 
 
 class TestEdgeWeights:

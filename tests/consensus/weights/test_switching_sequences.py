@@ -15,7 +15,8 @@ from hybrid_model.consensus.weights.random_switching import (
     markov_sequence,
     random_dwell_sequence,
 )
-from hybrid_model.consensus.weights.switching import PeriodicSwitching, SwitchingSequence
+from hybrid_model.consensus.weights.switching import SwitchingCycle
+from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
 
 THREE = ((1, 2), (2, 3), ())
 LISTED = SwitchingSequence((0.5, 1.25, 0.25), THREE, 3, repeat=True)
@@ -44,7 +45,7 @@ class TestListed:
     def test_equal_dwells_are_periodic_switching(self, dwell, count, t):
         active = tuple((k + 1,) for k in range(count))
         sequence = SwitchingSequence((dwell,) * count, active, count, repeat=True)
-        cyclic = PeriodicSwitching(dwell, active, count)
+        cyclic = SwitchingCycle(dwell, active, count)
         # The two place their instants by sums and by products, which differ in the last digits.
         if cyclic.breakpoints(t - 1e-9, t + 1e-9).size == 0:
             assert sequence.phase(t) == cyclic.phase(t)

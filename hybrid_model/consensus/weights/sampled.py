@@ -1,88 +1,25 @@
-"""Weights given by tables: levels that hold for a while, or samples with straight lines between them."""
+"""Weights known from samples, with straight lines between them."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid_model.consensus.weights.carriers import UnitCarrier
-from hybrid_model.consensus.weights.clockwork import not_negative
-from hybrid_model.consensus.weights.row_clock import RowClock, check_rows
-from hybrid_model.consensus.weights.waveform import ALWAYS, require
+from hybrid_model.consensus.entries import Entries
+from hybrid_model.consensus.messages import shown
+from hybrid_model.consensus.weights.row_clock import RowClock, check_rows, on_line
+from hybrid_model.consensus.weights.sample_files import read_samples
+from hybrid_model.consensus.weights.tabulated import TabulatedWeights
+from hybrid_model.consensus.weights.waveform import ALWAYS, Waveform, each_edge, require_values
+from hybrid_model.declare.variables import FloatArray
 
-__all__ = ["LinearCarrier", "PiecewiseWeight", "SampledWeight"]
-
-
-@dataclass(frozen=True)
-class PiecewiseWeight:
-    """A weight that is constant on pieces: ``values[k]`` from ``starts[k]`` on.
-
-    Parameters
-    ----------
-    starts : tuple of float
-        Times [s] at which the pieces begin, ascending.
-    values : tuple of float
-        The weight on each piece, not negative.
-    cycle : float, optional
-        Time [s] after which the pieces repeat. Without it the last value stays for ever, and the first one holds before
-        the first start too.
-
-    Raises
-    ------
-    ValueError
-        If the lists differ in length, a number is out of range or the times do not ascend.
-    """
-
-    starts: tuple[float, ...]
-    values: tuple[float, ...]
-    cycle: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        check_rows(self.starts, self.cycle, ("starts", "cycle"))
-        _require_values(self.values, len(self.starts), "starts")
-
-    @cached_property
-    def clock(self) -> RowClock:
-        """Which piece holds a time."""
-        return RowClock(self.starts, self.cycle)
-
-    @property
-    def carrier(self) -> UnitCarrier:
-        """The carrier 1."""
-        return UnitCarrier()
-
-    @property
-    def period(self) -> float | None:
-        """The cycle [s]; 0.0 if all values are equal; None if the pieces do not repeat."""
-        return 0.0 if len(set(self.values)) == 1 else self.cycle
-
-    @property
-    def domain(self) -> tuple[float, float]:
-        """All times."""
-        return ALWAYS
-
-    def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The weight at `t` [s], in the shape of `t`."""
-        return self._levels[self.clock.place(t)]
-
-    def value(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The weight at `t` [s], in the shape of `t`."""
-        return self.amplitude(t)
-
-    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
-        """Times strictly between `t0` and `t1` [s], ascending, at which a piece begins."""
-        return self.clock.breakpoints(t0, t1)
-
-    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
-        """Exact integral of the weight from `t0` to `t1` [s]; the two broadcast against each other."""
-        flat = np.zeros_like(self._levels)
-        return self.clock.primitive(self._levels, flat, t1) - self.clock.primitive(self._levels, flat, t0)
-
-    @cached_property
-    def _levels(self) -> NDArray[np.float64]:
-        return np.array(self.values, dtype=float)
+__all__ = ["LinearCarrier", "SampledWeight"]
 
 
 @dataclass(frozen=True)
@@ -105,6 +42,11 @@ class LinearCarrier:
     def rate(self) -> float:
         """0.0: it does not oscillate between breakpoints."""
         return 0.0
+
+    @property
+    def steepness(self) -> float:
+        """The largest slope."""
+        return float(np.max(np.abs(self.slopes)))
 
     @cached_property
     def clock(self) -> RowClock:
@@ -129,8 +71,7 @@ class LinearCarrier:
         time = np.asarray(t, dtype=float)
         number = self.clock.number(time)
         place = number % self.clock.rows
-        within = np.maximum(time - self.clock.begin(number), 0.0)
-        return np.asarray(not_negative(self.levels[place] + self.slopes[place] * within))
+        return np.asarray(on_line(self.levels[place], self.slopes[place], self.clock.begin(number), time))
 
     def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
         """Exact integral from `t0` to `t1` [s]."""
@@ -139,7 +80,7 @@ class LinearCarrier:
 
 
 @dataclass(frozen=True)
-class SampledWeight:
+class SampledWeight(Waveform):
     """A weight known from samples: a straight line between one sample and the next.
 
     Parameters
@@ -161,13 +102,15 @@ class SampledWeight:
     times: tuple[float, ...]
     values: tuple[float, ...]
     repeat: bool = False
+    automaton = TabulatedWeights
+    further_keys: ClassVar[tuple[str, ...]] = ("file", "times", "values", "repeat")
 
     def __post_init__(self) -> None:
         """Check the values."""
         if len(self.times) < 2:
             raise ValueError(f"times lists {len(self.times)} samples; there must be at least 2.")
         check_rows(self.times, None, ("times", ""))
-        _require_values(self.values, len(self.times), "times")
+        require_values(self.values, len(self.times), "times")
 
     def __hash__(self) -> int:
         """Taken once: the samples may be many."""
@@ -195,25 +138,42 @@ class SampledWeight:
         """The largest sample, in the shape of `t` [s]."""
         return np.full(np.shape(t), self._scale)
 
-    def value(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The weight at `t` [s], in the shape of `t`; outside the samples that of the nearest one."""
-        return self._scale * self.carrier.value(t)
-
     def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
         """Times of samples strictly between `t0` and `t1` [s], ascending."""
-        return self.carrier.clock.breakpoints(t0, t1)
+        return self.clock.breakpoints(t0, t1)
 
-    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
-        """Exact integral of the weight from `t0` to `t1` [s]; the two broadcast against each other."""
-        return self._scale * self.carrier.integral(t0, t1)
+    @property
+    def clock(self) -> RowClock:
+        """Which pair of samples a time lies between."""
+        return self.carrier.clock
+
+    def lines(self, begins: FloatArray, middles: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Values at the beginnings of rows, and slopes in them; see `TabulatedWeights`."""
+        place, own = self.clock.place(middles), self.clock.begin(self.clock.number(middles))
+        slopes = np.where(middles < own, 0.0, self._scale * self.carrier.slopes[place])
+        values = self._scale * self.carrier.levels[place] + slopes * (begins - own)
+        return np.maximum(values, 0.0), slopes
+
+    def changes(self, end: float) -> Iterator[tuple[str, float]]:
+        """See `Waveform.changes`."""
+        if self.repeat:
+            yield "times", end / (self.times[-1] - self.times[0]) * len(self.times)
+
+    @classmethod
+    def read(cls, entries: Entries, edges: int, folder: Path) -> tuple[Self, ...]:
+        """See `Waveform.read`."""
+        repeat, source = entries.flag("repeat", default=False), ""
+        if "file" in entries:
+            for key in ("times", "values"):
+                if key in entries:
+                    raise entries.error(key, "given beside file", "must be left out if the samples come from a file")
+            name = entries.text("file")
+            times, columns = read_samples(folder / name, edges)
+            source = f"file {shown(name)}, samples"
+        else:
+            times, columns = entries.numbers("times"), entries.rows("values", edges)
+        return each_edge(cls, ((times, values, repeat) for values in columns), source)
 
     @property
     def _scale(self) -> float:
         return float(max(self.values))
-
-
-def _require_values(values: tuple[float, ...], count: int, others: str) -> None:
-    if len(values) != count:
-        raise ValueError(f"values lists {len(values)} numbers for {count} {others}; give one for each.")
-    for number, value in enumerate(values, start=1):
-        require(f"values[{number}]", value, value >= 0, "must not be negative")

@@ -1,4 +1,4 @@
-"""Reading typed values out of TOML tables, with errors that name the table, the key, the value and the rule."""
+"""Typed values out of the tables of a TOML file, with errors that name the table, the key, the value and the rule."""
 
 import difflib
 import enum
@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from hybrid_model.consensus.messages import ScenarioError, shown
 
-__all__ = ["Table", "suggestion"]
+__all__ = ["Entries", "suggestion"]
 
 Choice = TypeVar("Choice", bound=enum.Enum)
 
@@ -21,15 +21,15 @@ def suggestion(name: str, known: Iterable[str]) -> str:
     return f" Did you mean '{nearest[0]}'?" if nearest else ""
 
 
-class Table:
-    """One table of a scenario file.
+class Entries:
+    """The entries of one table of a scenario file.
 
     Parameters
     ----------
     name : str
         How messages call it, such as ``[network]``.
-    entries : Mapping
-        Its parsed entries.
+    given : Mapping
+        As parsed.
     known : iterable of str
         The keys that it may have.
 
@@ -39,12 +39,12 @@ class Table:
         If there is a key that is not known.
     """
 
-    def __init__(self, name: str, entries: Mapping[str, Any], known: Iterable[str]) -> None:
+    def __init__(self, name: str, given: Mapping[str, Any], known: Iterable[str]) -> None:
         """Check the keys."""
         self.name = name
-        self._entries = entries
+        self._given = given
         names = list(known)
-        for key in entries:
+        for key in given:
             if key not in names:
                 raise ScenarioError(
                     f"{name} has the unknown key {shown(key)}.{suggestion(key, names)} Known keys: {', '.join(names)}."
@@ -52,11 +52,11 @@ class Table:
 
     def __contains__(self, key: str) -> bool:
         """Whether the key is given."""
-        return key in self._entries
+        return key in self._given
 
     def lists(self, key: str) -> bool:
         """Whether the key is given, as a list."""
-        return isinstance(self._entries.get(key), list)
+        return isinstance(self._given.get(key), list)
 
     def error(self, key: str, value: object, rule: str) -> ScenarioError:
         """The error for a value that breaks a rule ("it must ...")."""
@@ -64,9 +64,9 @@ class Table:
 
     def raw(self, key: str, rule: str) -> Any:
         """The entry as parsed; ScenarioError if it is missing."""
-        if key not in self._entries:
+        if key not in self._given:
             raise ScenarioError(f"{self.name} has no '{key}'; it {rule}.")
-        return self._entries[key]
+        return self._given[key]
 
     def text(self, key: str) -> str:
         """A string."""
@@ -116,7 +116,7 @@ class Table:
         """True or false."""
         if key not in self:
             return default
-        value = self._entries[key]
+        value = self._given[key]
         if not isinstance(value, bool):
             raise self.error(key, value, "must be true or false")
         return value

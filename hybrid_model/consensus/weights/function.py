@@ -1,21 +1,27 @@
-"""Weights given by a Python function of time, of the distance between agents, or of a link's reliability."""
+"""Weights given by a Python function of time."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
-from hybrid_model.consensus.graphs.undirected import Edge
+import hybrid_model as hm
+from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.weights.clockwork import not_negative
+from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 from hybrid_model.consensus.weights.primitive import Primitive
-from hybrid_model.consensus.weights.row_clock import RowClock, check_rows
-from hybrid_model.consensus.weights.waveform import ALWAYS, require
+from hybrid_model.consensus.weights.row_clock import RowAutomaton, RowClock, check_rows
+from hybrid_model.consensus.weights.tabulated import common_clock
+from hybrid_model.consensus.weights.waveform import Waveform, require
+from hybrid_model.declare.variables import Value
 
-__all__ = ["FunctionCarrier", "FunctionWeight", "TimeFunction", "distance_weights", "reliability_weight"]
+__all__ = ["FunctionCarrier", "FunctionWeight", "FunctionWeights", "TimeFunction"]
 
 TimeFunction = Callable[[Any], Any]
 """A function of time [s] in numpy style: the same line serves floats, arrays and symbols."""
@@ -43,6 +49,10 @@ class FunctionCarrier:
         rises = rises[rises != 0]
         return float(np.pi * np.count_nonzero(rises[1:] != rises[:-1]) / span)
 
+    @property
+    def steepness(self) -> None:
+        """None: not known."""
+
     @cached_property
     def clock(self) -> RowClock | None:
         """The kinks as beginnings of rows; None if there are none."""
@@ -56,14 +66,13 @@ class FunctionCarrier:
         """Kinks strictly between `t0` and `t1` [s], ascending."""
         return self.clock.breakpoints(t0, t1) if self.clock is not None else np.empty(0)
 
-    def value(self, t: ArrayLike) -> NDArray[np.float64]:
+    def value(self, t: Value) -> Value:
         """Value at time `t` [s]; what is below 0 counts as 0."""
-        return np.asarray(not_negative(self.raw(t)))
+        return not_negative(self.raw(t))
 
-    def raw(self, t: ArrayLike) -> NDArray[np.float64]:
-        """What the function gives at time `t` [s], below 0 or not."""
-        time = np.asarray(t, dtype=float)
-        return np.broadcast_to(np.asarray(self.function(time), dtype=float), time.shape)
+    def raw(self, t: Value) -> Value:
+        """What the function gives at time `t` [s], below 0 or not, in the shape of `t`."""
+        return self.function(t) + 0.0 * t
 
     def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
         """Integral from `t0` to `t1` [s] by Gauss quadrature, to about 12 digits of the integral of one cell."""
@@ -71,8 +80,37 @@ class FunctionCarrier:
         return self._primitive(end) - self._primitive(begin)
 
 
+class FunctionWeights(RowAutomaton, EdgeAutomaton):
+    """Weights that are functions of time given in Python; the rows begin where one of them has a kink.
+
+    Parameters
+    ----------
+    functions : sequence of callable
+        For each edge ``function(t)`` in numpy style, continuous; what is below 0 counts as 0.
+    name : str, optional
+        Name of the instance.
+    **values
+        ``starts`` (the kinks) and ``period``.
+    """
+
+    def __init__(self, functions: Sequence[TimeFunction], name: str | None = None, **values: Any) -> None:
+        self.functions = tuple(functions)
+        super().__init__(name, degree=len(self.functions), **{"starts": [0.0], **values})
+
+    def outputs(self, s: hm.Values) -> dict[str, Value]:
+        """The weights."""
+        return {"weights": np.stack([FunctionCarrier(function).value(s.t) for function in self.functions])}
+
+    @classmethod
+    def of(cls, waveforms: Sequence[Any]) -> Self:
+        """The functions, and the kinks of all; ScenarioError if these have no common period."""
+        clocks = [waveform.carrier.clock for waveform in waveforms if waveform.carrier.clock is not None]
+        clock = common_clock(clocks) if clocks else RowClock((0.0,))
+        return cls([waveform.function for waveform in waveforms], starts=clock.starts, period=clock.period or 0.0)
+
+
 @dataclass(frozen=True)
-class FunctionWeight:
+class FunctionWeight(Waveform):
     """A weight that is a given function of time.
 
     Parameters
@@ -97,6 +135,7 @@ class FunctionWeight:
     function: TimeFunction
     kinks: tuple[float, ...] = ()
     period: float | None = None
+    automaton = FunctionWeights
 
     def __post_init__(self) -> None:
         """Try the function out."""
@@ -125,120 +164,17 @@ class FunctionWeight:
         """The function."""
         return FunctionCarrier(self.function, self.kinks, self.period)
 
-    @property
-    def domain(self) -> tuple[float, float]:
-        """All times."""
-        return ALWAYS
-
     def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
         """1, in the shape of `t` [s]."""
         return np.ones(np.shape(t))
-
-    def value(self, t: ArrayLike) -> NDArray[np.float64]:
-        """The weight at `t` [s], in the shape of `t`."""
-        return self.carrier.value(t)
 
     def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
         """Kinks strictly between `t0` and `t1` [s], ascending."""
         return self.carrier.breakpoints(t0, t1)
 
-    def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
-        """Integral of the weight from `t0` to `t1` [s] to about 12 digits; the two broadcast against each other."""
-        return self.carrier.integral(t0, t1)
-
-
-def reliability_weight(
-    law: Callable[[Any], Any], reliability: TimeFunction, kinks: Sequence[float] = (), period: float | None = None
-) -> FunctionWeight:
-    """The weight ``law(reliability(t))`` of a link whose reliability is known as a function of time.
-
-    Parameters
-    ----------
-    law : callable
-        Weight as a function of the reliability, in numpy style.
-    reliability : callable
-        Reliability of the link at time t [s], in numpy style.
-    kinks, period
-        As in `FunctionWeight`.
-    """
-    return FunctionWeight(lambda t: law(reliability(t)), tuple(kinks), period)
-
-
-def distance_weights(
-    edges: Sequence[Edge],
-    positions: Sequence[Callable[[Any], Sequence[Any]]],
-    law: Callable[[Any], Any],
-    *,
-    bends: Sequence[float] = (),
-    horizon: float,
-    period: float | None = None,
-) -> tuple[FunctionWeight, ...]:
-    """Weights ``law(distance)`` of edges between agents that move along given paths.
-
-    Parameters
-    ----------
-    edges : sequence of Edge
-        Pairs of agents, counted from 1.
-    positions : sequence of callable
-        For each agent ``t -> (coordinate, coordinate, ...)`` in numpy style.
-    law : callable
-        Weight as a function of the distance, in numpy style and continuous, such as ``np.exp(-d**2)``.
-    bends : sequence of float
-        Distances at which the law has a kink, such as the range of a radio; the times at which an edge passes them are
-        found and become kinks of its weight.
-    horizon : float
-        Time [s] up to which they are looked for; with a period, one period is searched.
-    period : float, optional
-        Common period of the paths [s].
-
-    Notes
-    -----
-    The times are bracketed on a grid of 4096 steps, so two passages within one step can escape; the weight is
-    continuous there, and an integrator only takes smaller steps.
-    """
-    return tuple(_distance_weight(positions[i - 1], positions[j - 1], law, bends, horizon, period) for i, j in edges)
-
-
-def _distance_weight(
-    first: Callable[[Any], Sequence[Any]],
-    second: Callable[[Any], Sequence[Any]],
-    law: Callable[[Any], Any],
-    bends: Sequence[float],
-    horizon: float,
-    period: float | None,
-) -> FunctionWeight:
-    distance = _Distance(first, second)
-    end = period if period is not None else horizon
-    kinks = sorted({time for bend in bends for time in _passages(distance, bend, end)})
-    return FunctionWeight(_OfDistance(law, distance), tuple(kinks), period)
-
-
-@dataclass(frozen=True)
-class _Distance:
-    """Distance of two positions over time; a class, like the next, since functions in functions cannot be pickled."""
-
-    first: Callable[[Any], Sequence[Any]]
-    second: Callable[[Any], Sequence[Any]]
-
-    def __call__(self, t: Any) -> Any:
-        return np.sqrt(sum((a - b) ** 2 for a, b in zip(self.first(t), self.second(t), strict=True)))
-
-
-@dataclass(frozen=True)
-class _OfDistance:
-    """A law of the distance, as a function of time."""
-
-    law: Callable[[Any], Any]
-    distance: _Distance
-
-    def __call__(self, t: Any) -> Any:
-        return self.law(self.distance(t))
-
-
-def _passages(distance: TimeFunction, bend: float, end: float) -> list[float]:
-    """Times in ``[0, end)`` at which the distance passes `bend`."""
-    times = np.linspace(0.0, end, 4097)
-    side = distance(times) - bend + np.zeros_like(times)
-    exact: list[float] = times[:-1][side[:-1] == 0].tolist()
-    changes = np.flatnonzero(side[:-1] * side[1:] < 0)
-    return exact + [brentq(lambda t: float(distance(t)) - bend, times[k], times[k + 1], xtol=1e-14) for k in changes]
+    @classmethod
+    def read(cls, entries: Entries, edges: int, folder: Path) -> tuple[Self, ...]:
+        """Refuse: a file holds no functions."""
+        raise entries.error(
+            "kind", "function", "is for scenarios made in Python (FunctionWeight); sample the function for a file"
+        )

@@ -7,7 +7,7 @@ from abc import abstractmethod
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.consensus.scenario.thresholds import exponential_threshold, mixed_threshold
+from hybrid_model.consensus.scenario.trigger import Threshold
 from hybrid_model.declare.variables import Value
 
 
@@ -56,7 +56,7 @@ class StaticTrigger(ThresholdTrigger):
 
     def threshold_now(self, s: hm.Values) -> Value:
         """``c``."""
-        return s.threshold
+        return Threshold(s.threshold).at(s.t)
 
 
 class DynamicTrigger(ThresholdTrigger):
@@ -66,7 +66,7 @@ class DynamicTrigger(ThresholdTrigger):
 
     def threshold_now(self, s: hm.Values) -> Value:
         """``c exp(-beta t)``."""
-        return exponential_threshold(s.threshold, s.decay, s.t)
+        return Threshold(s.threshold, s.decay).at(s.t)
 
 
 class MixedTrigger(DynamicTrigger):
@@ -81,4 +81,4 @@ class MixedTrigger(DynamicTrigger):
 
     def threshold_now(self, s: hm.Values) -> Value:
         """``c0 + c1 exp(-beta t)``."""
-        return mixed_threshold(s.offset, s.threshold, s.decay, s.t)
+        return Threshold(s.threshold, s.decay, s.offset).at(s.t)
