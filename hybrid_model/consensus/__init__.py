@@ -28,7 +28,7 @@ from hybrid_model.consensus.graphs.generators import (
     small_world_graph,
     star_graph,
 )
-from hybrid_model.consensus.graphs.spanning_trees import TreePartition
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition, all_spanning_trees, spanning_tree_count
 from hybrid_model.consensus.laws.agents import Integrator, agent
 from hybrid_model.consensus.laws.closed_loop import broadcast_wires, closed_loop, scenario_agents
 from hybrid_model.consensus.laws.double_integrators import (
@@ -46,26 +46,22 @@ from hybrid_model.consensus.scenario.channel import Channel
 from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
 from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.consensus.weights.connectivity import (
-    all_spanning_trees,
-    joint_connectivity_window,
-    spanning_tree_count,
+from hybrid_model.consensus.switching.cycle import PeriodicSwitching
+from hybrid_model.consensus.switching.joint_connectivity import joint_connectivity_window
+from hybrid_model.consensus.switching.random_sequences import (
+    jointly_connected_sequence,
+    markov_sequence,
+    random_dwell_sequence,
 )
+from hybrid_model.consensus.switching.sequence import SequenceSwitching, SwitchingSequence
 from hybrid_model.consensus.weights.constant import ConstantWeight, ConstantWeights
 from hybrid_model.consensus.weights.distances import distance_weights, reliability_weight
 from hybrid_model.consensus.weights.function import FunctionWeight, FunctionWeights
 from hybrid_model.consensus.weights.gated_sine import GatedAbsoluteSineWeights, GatedSine, GatedSineWeights
 from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
-from hybrid_model.consensus.weights.random_switching import (
-    jointly_connected_sequence,
-    markov_sequence,
-    random_dwell_sequence,
-)
 from hybrid_model.consensus.weights.sampled import SampledWeight
 from hybrid_model.consensus.weights.sine import SineWeight, SineWeights
 from hybrid_model.consensus.weights.square import SquareWeight, SquareWeights
-from hybrid_model.consensus.weights.switching import PeriodicSwitching
-from hybrid_model.consensus.weights.switching_sequence import SequenceSwitching, SwitchingSequence
 from hybrid_model.consensus.weights.tabulated import TabulatedWeights
 
 __all__ = [

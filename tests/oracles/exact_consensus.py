@@ -19,9 +19,9 @@ import numpy as np
 
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
+from hybrid_model.consensus.switching.base import NoSwitching
 from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.gated_sine import WeightMap
-from hybrid_model.consensus.weights.switching import NoSwitching
 
 EPS = np.finfo(float).eps
 THRESHOLDS = (TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.MIXED, TriggerKind.SELF_TRIGGERED)

@@ -9,11 +9,12 @@ from bisect import bisect_right
 
 import numpy as np
 
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
 from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
 from hybrid_model.consensus.weights.sampled import SampledWeight
 from hybrid_model.consensus.weights.square import SquareWeight
-from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
 
 
 def table_run(scenario):

@@ -6,14 +6,14 @@ from hybrid_model import consensus
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
 from hybrid_model.consensus.scenario.definition import Scenario, Weights
 from hybrid_model.consensus.scenario.files import read_scenario
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.random_sequences import markov_sequence
+from hybrid_model.consensus.switching.sequence import SequenceSwitching
 from hybrid_model.consensus.weights.distances import distance_weights
 from hybrid_model.consensus.weights.function import FunctionWeights
 from hybrid_model.consensus.weights.kinds import weights_block
 from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
-from hybrid_model.consensus.weights.random_switching import markov_sequence
 from hybrid_model.consensus.weights.sampled import SampledWeight
-from hybrid_model.consensus.weights.switching import NoSwitching
-from hybrid_model.consensus.weights.switching_sequence import SequenceSwitching
 from hybrid_model.consensus.weights.tabulated import TabulatedWeights
 
 RING = {"agents": 4, "edges": [[1, 2], [2, 3], [3, 4], [4, 1]], "initial": [1.0, 2.0, 0.3, 0.4]}

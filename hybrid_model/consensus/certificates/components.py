@@ -9,7 +9,7 @@ import networkx as nx
 import numpy as np
 
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
-from hybrid_model.consensus.weights.switching import NoSwitching
+from hybrid_model.consensus.switching.base import NoSwitching
 
 __all__ = ["active_edges", "component_scenarios", "connected_components"]
 

@@ -21,9 +21,9 @@ from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
 from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
+from hybrid_model.consensus.switching.base import NoSwitching
 from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
-from hybrid_model.consensus.weights.switching import NoSwitching
 
 __all__ = [
     "Counterexample",

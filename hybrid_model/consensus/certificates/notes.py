@@ -17,7 +17,7 @@ from hybrid_model.consensus.certificates.verdicts import statement
 from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.runs.report import edge_norm
 from hybrid_model.consensus.scenario.trigger import TriggerKind
-from hybrid_model.consensus.weights.switching import NoSwitching
+from hybrid_model.consensus.switching.base import NoSwitching
 
 __all__ = ["scenario_notes"]
 

@@ -22,7 +22,8 @@ from hybrid_model.consensus.excitation.persistence import (
     signal_factor,
     window_extremes,
 )
-from hybrid_model.consensus.graphs.spanning_trees import TreePartition, is_connected
+from hybrid_model.consensus.graphs.connectivity import is_connected
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import incidence
 from hybrid_model.consensus.scenario.definition import Scenario
 

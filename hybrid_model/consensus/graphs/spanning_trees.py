@@ -1,9 +1,9 @@
-"""Coordinates of a connected graph along one of its spanning trees: the transformations of the paper's section 3.
+"""Spanning trees, and coordinates of a connected graph along one of them: the transformations of the paper's section 3.
 
 Edges are numbered from 1 at this interface, in the order of the user; arrays count from 0 inside.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,14 +11,10 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_model.consensus.graphs.undirected import Edge, incidence, validate_edges
+from hybrid_model.consensus.graphs.connectivity import components, is_connected
+from hybrid_model.consensus.graphs.undirected import Edge, incidence, validate_edges, weighted_laplacian
 
-__all__ = ["TreePartition", "is_connected", "spanning_tree"]
-
-
-def is_connected(agents: int, edges: Sequence[Edge]) -> bool:
-    """Whether every agent can be reached from every other along the edges."""
-    return bool(nx.is_connected(_networkx_graph(agents, edges)))
+__all__ = ["TreePartition", "all_spanning_trees", "spanning_tree", "spanning_tree_count"]
 
 
 def spanning_tree(agents: int, edges: Sequence[Edge]) -> tuple[int, ...]:
@@ -31,14 +27,48 @@ def spanning_tree(agents: int, edges: Sequence[Edge]) -> tuple[int, ...]:
     ValueError
         If the graph is not connected and so has no spanning tree.
     """
-    graph = _networkx_graph(agents, edges)
-    if not nx.is_connected(graph):
-        parts = [sorted(part) for part in nx.connected_components(graph)]
+    parts = components(agents, edges)
+    if len(parts) > 1:
         raise ValueError(
             f"the graph is not connected: its parts are the agents {parts}; a spanning tree needs edges between them."
         )
-    tree = nx.minimum_spanning_edges(graph, algorithm="kruskal", weight="number", data=True)
+    tree = nx.minimum_spanning_edges(_networkx_graph(agents, edges), algorithm="kruskal", weight="number", data=True)
     return tuple(sorted(data["number"] for _, _, data in tree))
+
+
+def spanning_tree_count(agents: int, edges: Sequence[Edge]) -> int:
+    """Number of spanning trees, by Kirchhoff's matrix-tree theorem: any cofactor of the Laplacian.
+
+    Exact as long as the number is below about 1e15.
+    """
+    matrix = weighted_laplacian(agents, edges, np.ones(len(edges)))
+    return round(float(np.linalg.det(matrix[1:, 1:])))
+
+
+def all_spanning_trees(agents: int, edges: Sequence[Edge]) -> Iterator[tuple[int, ...]]:
+    """All spanning trees as ascending tuples of edge numbers from 1, in lexicographic order; none if not connected.
+
+    The work is proportional to their number, which `spanning_tree_count` tells in advance: ``n**(n - 2)`` for the
+    complete graph.
+    """
+    validate_edges(agents, edges)
+    if not is_connected(agents, edges):
+        return
+    yield from _grow(agents, edges, (), 0)
+
+
+def _grow(agents: int, edges: Sequence[Edge], chosen: tuple[int, ...], place: int) -> Iterator[tuple[int, ...]]:
+    """The trees that contain `chosen` and else only edges from index `place` on; there is at least one."""
+    if len(chosen) == agents - 1:
+        yield chosen
+        return
+    parts = components(agents, [edges[k - 1] for k in chosen])
+    tail, head = edges[place]
+    if not any(tail in part and head in part for part in parts):
+        yield from _grow(agents, edges, (*chosen, place + 1), place + 1)
+    left = [*(edges[k - 1] for k in chosen), *edges[place + 1 :]]
+    if is_connected(agents, left):
+        yield from _grow(agents, edges, chosen, place + 1)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from hybrid_model.consensus.laws.threshold_triggers import DynamicTrigger, Mixed
 from hybrid_model.consensus.laws.timed_triggers import PeriodicBroadcast, SampledTrigger
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.consensus.weights.switching import NoSwitching, Switching, SwitchingCycle, masks
+from hybrid_model.consensus.switching.base import NoSwitching, Switching, masks
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
 from hybrid_model.consensus.weights.waveform import Waveform
 
 __all__ = ["Surroundings", "event_generator"]

@@ -18,10 +18,10 @@ from typing import ClassVar
 import numpy as np
 
 import hybrid_model as hm
+from hybrid_model.consensus.clocks.clockwork import dwell_boundary, dwell_index, in_turn
 from hybrid_model.consensus.laws.forecast import Forecast
 from hybrid_model.consensus.laws.threshold_triggers import EventGenerator
 from hybrid_model.consensus.scenario.trigger import Threshold
-from hybrid_model.consensus.weights.clockwork import dwell_boundary, dwell_index, in_turn
 from hybrid_model.consensus.weights.constant import ConstantWeights
 from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton, ForeseenWeights
 from hybrid_model.consensus.weights.gated_sine import GatedAbsoluteSineWeights, GatedSineWeights

@@ -9,9 +9,9 @@ from hybrid_model.consensus.graphs.undirected import Edge, complete_edges, valid
 from hybrid_model.consensus.messages import ScenarioError, shown
 from hybrid_model.consensus.scenario.channel import IDEAL, Channel
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
+from hybrid_model.consensus.switching.base import Switching
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.kinds import WeightKind
-from hybrid_model.consensus.weights.switching import Switching
 from hybrid_model.consensus.weights.waveform import Waveform
 
 __all__ = ["Network", "Scenario", "Underlying", "Weights", "replace_trigger"]

@@ -14,8 +14,8 @@ from hybrid_model.consensus.scenario.channel import IDEAL, Channel
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Underlying, Weights, replace_trigger
 from hybrid_model.consensus.scenario.read_switching import read_switching
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind, trigger_keys
+from hybrid_model.consensus.switching.base import NoSwitching, Switching
 from hybrid_model.consensus.weights.kinds import read_weights
-from hybrid_model.consensus.weights.switching import NoSwitching, Switching
 
 __all__ = ["load_scenario", "preset_names", "read_scenario"]
 

@@ -6,14 +6,15 @@ from collections.abc import Callable
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Network
-from hybrid_model.consensus.weights.random_switching import (
+from hybrid_model.consensus.switching.base import Switching, validate_active
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
+from hybrid_model.consensus.switching.random_sequences import (
     Order,
     jointly_connected_sequence,
     markov_sequence,
     random_dwell_sequence,
 )
-from hybrid_model.consensus.weights.switching import Switching, SwitchingCycle, validate_active
-from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
+from hybrid_model.consensus.switching.sequence import SwitchingSequence
 
 __all__ = ["SWITCHING_KEYS", "SwitchingKind", "read_switching"]
 

@@ -1,4 +1,4 @@
-"""Weights of edges and switching as functions of time, and as automata.
+"""Weights of edges as functions of time, and as automata: one file a kind, and a line for it in `kinds`.
 
-It imports `graphs`; scenarios are made of it.
+It imports `switching` and `clocks`; scenarios are made of it.
 """

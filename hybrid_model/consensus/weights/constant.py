@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
+from hybrid_model.consensus.clocks.checks import require
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.weights.carriers import UnitCarrier
 from hybrid_model.consensus.weights.edge_automata import ForeseenWeights
-from hybrid_model.consensus.weights.waveform import Waveform, each_edge, require
+from hybrid_model.consensus.weights.waveform import Waveform, each_edge
 from hybrid_model.declare.variables import Value
 
 __all__ = ["ConstantWeight", "ConstantWeights"]

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hybrid_model.consensus.clocks.periods import common_period
+from hybrid_model.consensus.switching.base import Switching
 from hybrid_model.consensus.weights.carriers import Carrier
-from hybrid_model.consensus.weights.periods import common_period
-from hybrid_model.consensus.weights.switching import Switching
 from hybrid_model.consensus.weights.waveform import Waveform
 
 __all__ = ["EdgeWeights", "Piece", "WeightPrimitive"]

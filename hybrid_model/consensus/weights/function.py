@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
+from hybrid_model.consensus.clocks.checks import require
+from hybrid_model.consensus.clocks.clockwork import not_negative
+from hybrid_model.consensus.clocks.row_clock import RowAutomaton, RowClock, check_rows
 from hybrid_model.consensus.entries import Entries
-from hybrid_model.consensus.weights.clockwork import not_negative
 from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 from hybrid_model.consensus.weights.primitive import Primitive
-from hybrid_model.consensus.weights.row_clock import RowAutomaton, RowClock, check_rows
 from hybrid_model.consensus.weights.tabulated import common_clock
-from hybrid_model.consensus.weights.waveform import Waveform, require
+from hybrid_model.consensus.weights.waveform import Waveform
 from hybrid_model.declare.variables import Value
 
 __all__ = ["FunctionCarrier", "FunctionWeight", "FunctionWeights", "TimeFunction"]

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
+from hybrid_model.consensus.clocks.checks import require, require_phase
+from hybrid_model.consensus.clocks.clockwork import holding, is_odd
 from hybrid_model.consensus.weights.carriers import Carrier
-from hybrid_model.consensus.weights.clockwork import holding, is_odd
 from hybrid_model.consensus.weights.edge_automata import PIECE_EVENTS, ForeseenWeights
-from hybrid_model.consensus.weights.waveform import require, require_phase
 from hybrid_model.declare.variables import Value
 
 __all__ = ["Gate", "GateClock", "gate_boundary", "gate_segment", "is_open"]

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
+from hybrid_model.consensus.clocks.checks import require
+from hybrid_model.consensus.clocks.clockwork import half_wave, half_wave_boundary
+from hybrid_model.consensus.clocks.periods import common_period
 from hybrid_model.consensus.entries import Entries
-from hybrid_model.consensus.weights.clockwork import half_wave, half_wave_boundary
 from hybrid_model.consensus.weights.gate import Gate, GateClock, is_open
-from hybrid_model.consensus.weights.periods import common_period
-from hybrid_model.consensus.weights.waveform import Waveform, each_edge, require
+from hybrid_model.consensus.weights.waveform import Waveform, each_edge
 from hybrid_model.declare.variables import Value
 
 __all__ = ["GatedAbsoluteSineWeights", "GatedSine", "GatedSineWeights", "SineCarrier", "WeightMap"]

@@ -11,9 +11,9 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hybrid_model.consensus.clocks.row_clock import RowClock, check_rows
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.weights.carriers import UnitCarrier
-from hybrid_model.consensus.weights.row_clock import RowClock, check_rows
 from hybrid_model.consensus.weights.tabulated import TabulatedWeights
 from hybrid_model.consensus.weights.waveform import Waveform, each_edge, require_values
 from hybrid_model.declare.variables import FloatArray

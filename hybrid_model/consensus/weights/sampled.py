@@ -11,12 +11,13 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hybrid_model.consensus.clocks.checks import ALWAYS
+from hybrid_model.consensus.clocks.row_clock import RowClock, check_rows, on_line
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.messages import shown
-from hybrid_model.consensus.weights.row_clock import RowClock, check_rows, on_line
 from hybrid_model.consensus.weights.sample_files import read_samples
 from hybrid_model.consensus.weights.tabulated import TabulatedWeights
-from hybrid_model.consensus.weights.waveform import ALWAYS, Waveform, each_edge, require_values
+from hybrid_model.consensus.weights.waveform import Waveform, each_edge, require_values
 from hybrid_model.declare.variables import FloatArray
 
 __all__ = ["LinearCarrier", "SampledWeight"]

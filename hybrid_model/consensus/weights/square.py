@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
+from hybrid_model.consensus.clocks.checks import require
 from hybrid_model.consensus.weights.carriers import UnitCarrier
 from hybrid_model.consensus.weights.gate import Gate, GateClock, is_open
-from hybrid_model.consensus.weights.waveform import Waveform, require
+from hybrid_model.consensus.weights.waveform import Waveform
 from hybrid_model.declare.variables import Value
 
 __all__ = ["SquareWeight", "SquareWeights"]

@@ -9,15 +9,13 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hybrid_model.consensus.clocks.checks import ALWAYS, require
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.weights.carriers import Carrier
 from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 
-__all__ = ["ALWAYS", "Waveform", "each_edge", "require", "require_phase", "require_values"]
-
-ALWAYS = (-math.inf, math.inf)
-"""The domain of a weight that is defined at all times."""
+__all__ = ["Waveform", "each_edge", "require_values"]
 
 
 class Waveform(ABC):
@@ -98,19 +96,6 @@ def each_edge(kind: Callable[..., Kind], rows: Iterable[Any], source: str = "") 
             where = f"{source} of edge {number}" if source else f"of edge {number}"
             raise ScenarioError(f"[weights] {where}: {error}") from error
     return tuple(waveforms)
-
-
-def require(name: str, value: float, is_valid: bool, rule: str) -> None:
-    """Check a number of a waveform; ValueError with its name, value and rule if it is not finite or not valid."""
-    if not math.isfinite(value):
-        raise ValueError(f"{name} is {value}; it must be a finite number.")
-    if not is_valid:
-        raise ValueError(f"{name} is {value}; it {rule}.")
-
-
-def require_phase(phase: float) -> None:
-    """Check a phase [rad]: with a very large one nothing is left of the time in ``rate*t - phase``."""
-    require("phase", phase, abs(phase) <= 1e6, "must lie between -1e6 and 1e6")
 
 
 def require_values(values: tuple[float, ...], count: int, others: str) -> None:

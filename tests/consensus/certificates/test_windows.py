@@ -29,11 +29,11 @@ from hybrid_model.consensus.excitation.persistence import (
 )
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.scenario.files import load_scenario, preset_names
+from hybrid_model.consensus.switching.base import NoSwitching
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.function import FunctionWeight
 from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
 from hybrid_model.consensus.weights.sine import SineWeight
-from hybrid_model.consensus.weights.switching import NoSwitching
 
 PERIODIC = {
     "sine": {"kind": "sine", "mean": [0.5, 1.0, 0.7, 0.3], "depth": 0.9, "rate": [1.0, 2.0, 3.0, 1.5], "phase": 0.4},

@@ -18,10 +18,11 @@ from hybrid_model.consensus.excitation.persistence import (
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
 from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
-from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
 
 PUBLISHED = 1e-6  # the reference values are given with six decimals
 

@@ -6,6 +6,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from hybrid_model.consensus.graphs.connectivity import algebraic_connectivity, components, is_connected
 from hybrid_model.consensus.graphs.generators import (
     agent_graph,
     complete_graph,
@@ -18,19 +19,13 @@ from hybrid_model.consensus.graphs.generators import (
     small_world_graph,
     star_graph,
 )
-from hybrid_model.consensus.graphs.spanning_trees import TreePartition, is_connected
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition, all_spanning_trees, spanning_tree_count
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence, laplacian
-from hybrid_model.consensus.weights.connectivity import (
-    algebraic_connectivity,
-    all_spanning_trees,
-    components,
-    joint_connectivity_window,
-    spanning_tree_count,
-    union_edges,
-)
-from hybrid_model.consensus.weights.random_switching import random_dwell_sequence
-from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
-from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
+from hybrid_model.consensus.switching.joint_connectivity import joint_connectivity_window, union_edges
+from hybrid_model.consensus.switching.random_sequences import random_dwell_sequence
+from hybrid_model.consensus.switching.sequence import SwitchingSequence
 
 ROUNDING = 1e-10  # eigenvalues of matrices of size <= 9 with entries of order 1
 

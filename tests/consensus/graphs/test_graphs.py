@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hybrid_model.consensus.graphs.spanning_trees import TreePartition, is_connected, spanning_tree
+from hybrid_model.consensus.graphs.connectivity import is_connected
+from hybrid_model.consensus.graphs.spanning_trees import TreePartition, spanning_tree
 from hybrid_model.consensus.graphs.undirected import (
     complete_edges,
     disagreement_basis,

@@ -10,6 +10,9 @@ from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario, Weights
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
+from hybrid_model.consensus.switching.sequence import SwitchingSequence
 from hybrid_model.consensus.weights.function import FunctionWeight
 from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
 from hybrid_model.consensus.weights.kinds import WeightKind
@@ -17,8 +20,6 @@ from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
 from hybrid_model.consensus.weights.sampled import SampledWeight
 from hybrid_model.consensus.weights.sine import SineWeight
 from hybrid_model.consensus.weights.square import SquareWeight
-from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
-from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
 
 BASE = {
     "name": "three",

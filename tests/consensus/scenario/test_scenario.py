@@ -12,10 +12,11 @@ from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Underlying, replace_trigger
 from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
 from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
 from hybrid_model.consensus.weights.kinds import WeightKind
-from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
 
 VALID = {
     "name": "three",

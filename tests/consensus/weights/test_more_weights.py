@@ -11,18 +11,18 @@ from own_importer import Exchange, Importer
 from scipy.integrate import quad
 
 import hybrid_model as hm
+from hybrid_model.consensus.clocks.row_clock import RowClock, row_begin, row_number
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.sequence import SwitchingSequence
 from hybrid_model.consensus.weights.carriers import UnitCarrier
 from hybrid_model.consensus.weights.distances import distance_weights, reliability_weight
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.function import FunctionWeight
 from hybrid_model.consensus.weights.kinds import weights_block
 from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
-from hybrid_model.consensus.weights.row_clock import RowClock, row_begin, row_number
 from hybrid_model.consensus.weights.sampled import SampledWeight
 from hybrid_model.consensus.weights.sine import SineWeight
 from hybrid_model.consensus.weights.square import SquareWeight
-from hybrid_model.consensus.weights.switching import NoSwitching
-from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
 from hybrid_model.consensus.weights.waveform import Waveform
 from hybrid_model.native.compiled import compiled
 

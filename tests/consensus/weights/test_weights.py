@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from hybrid_model.consensus.weights.clockwork import dwell_boundary, dwell_index, half_wave, half_wave_boundary
+from hybrid_model.consensus.clocks.clockwork import dwell_boundary, dwell_index, half_wave, half_wave_boundary
+from hybrid_model.consensus.clocks.periods import common_period
 from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.gate import gate_boundary, gate_segment, is_open
 from hybrid_model.consensus.weights.gated_sine import GatedSine, SineCarrier, WeightMap
-from hybrid_model.consensus.weights.periods import common_period
 
 rates = st.floats(0.05, 30.0)
 phases = st.floats(-20.0, 20.0)

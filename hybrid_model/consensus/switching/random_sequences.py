@@ -11,12 +11,12 @@ from collections.abc import Callable, Sequence
 import networkx as nx
 import numpy as np
 
-from hybrid_model.consensus.graphs.spanning_trees import is_connected
+from hybrid_model.consensus.clocks.checks import require
+from hybrid_model.consensus.graphs.connectivity import is_connected
 from hybrid_model.consensus.graphs.undirected import Edge
 from hybrid_model.consensus.messages import shown
-from hybrid_model.consensus.weights.switching import validate_active
-from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
-from hybrid_model.consensus.weights.waveform import require
+from hybrid_model.consensus.switching.base import validate_active
+from hybrid_model.consensus.switching.sequence import SwitchingSequence
 
 __all__ = ["Order", "jointly_connected_sequence", "markov_sequence", "random_dwell_sequence"]
 

@@ -8,10 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
 from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
-from hybrid_model.consensus.weights.switching import NoSwitching, SwitchingCycle
 
 TWO_TREES = SwitchingCycle(math.pi, ((1, 2, 3), (2, 3, 4)), 4)
 MIXED = EdgeWeights(

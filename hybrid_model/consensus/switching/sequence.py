@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.weights.clockwork import in_turn
-from hybrid_model.consensus.weights.row_clock import RowAutomaton, RowClock
-from hybrid_model.consensus.weights.switching import Switching, SwitchingAutomaton, masks, validate_active
-from hybrid_model.consensus.weights.waveform import ALWAYS, require
+from hybrid_model.consensus.clocks.checks import ALWAYS, require
+from hybrid_model.consensus.clocks.clockwork import in_turn
+from hybrid_model.consensus.clocks.row_clock import RowAutomaton, RowClock
+from hybrid_model.consensus.switching.base import Switching, SwitchingAutomaton, masks, validate_active
 from hybrid_model.declare.variables import Value
 
 __all__ = ["SequenceSwitching", "SwitchingSequence"]

@@ -9,14 +9,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hybrid_model.consensus.graphs.undirected import complete_edges
-from hybrid_model.consensus.weights.random_switching import (
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
+from hybrid_model.consensus.switching.random_sequences import (
     Order,
     jointly_connected_sequence,
     markov_sequence,
     random_dwell_sequence,
 )
-from hybrid_model.consensus.weights.switching import SwitchingCycle
-from hybrid_model.consensus.weights.switching_sequence import SwitchingSequence
+from hybrid_model.consensus.switching.sequence import SwitchingSequence
 
 THREE = ((1, 2), (2, 3), ())
 LISTED = SwitchingSequence((0.5, 1.25, 0.25), THREE, 3, repeat=True)
