@@ -84,6 +84,12 @@ class Composition(Automaton):
         for (part, variable), wire in _wires(self, connections or {}).items():
             self._wires[part][variable] = wire
         self._names = _scoped_names(self, names or {})
+        self._lay_out_variables()
+        self._lay_out_jumps()
+        self.priority = _common_priority(self)
+        self._refuse_loops()
+
+    def _lay_out_variables(self) -> None:
         self.variables = tuple(
             variable.renamed(self._names[part, variable.name], f"{part}.")
             for part, automaton in self.parts.items()
@@ -99,14 +105,16 @@ class Composition(Automaton):
             }
             for part, automaton in self.parts.items()
         }
-        # Most parts have no say in most maps: these lists keep evaluation short.
+        # Most parts have no say in most maps: this list and those of jumps keep evaluation short.
         self._with_states = [(p, a) for p, a in self.parts.items() if a.of_kind(Kind.STATE)]
-        self._with_guards = [(p, a) for p, a in self.parts.items() if any(j.trigger is Trigger.STATE for j in a.jumps)]
-        self._with_times = [(p, a) for p, a in self.parts.items() if any(j.trigger is Trigger.TIME for j in a.jumps)]
         self._computed = {
             (p, v.name): None for p, automaton in self.parts.items() for v in automaton.of_kind(Kind.OUTPUT)
         }
         self._computed_by_name = {self._names[owner]: owner for owner in self._computed}
+
+    def _lay_out_jumps(self) -> None:
+        self._with_guards = [(p, a) for p, a in self.parts.items() if any(j.trigger is Trigger.STATE for j in a.jumps)]
+        self._with_times = [(p, a) for p, a in self.parts.items() if any(j.trigger is Trigger.TIME for j in a.jumps)]
         self._owner = [(part, k) for part, automaton in self.parts.items() for k in range(len(automaton.jumps))]
         self.jumps = tuple(
             JumpInfo(f"{part}.{info.name}", info.trigger, info.internal)
@@ -119,8 +127,6 @@ class Composition(Automaton):
             for part, automaton in self.parts.items()
             for clock in automaton.clocks
         )
-        self.priority = _common_priority(self)
-        self._refuse_loops()
 
     @property
     def has_flow_set(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hybrid_model.record.flow_piece import FlowPiece, straight_piece
+from hybrid_model.reference.end_of_flow import go_on_to, raise_levels, reach_guard
 from hybrid_model.reference.event_location import EventLocator
 from hybrid_model.reference.point import Point
 from hybrid_model.reference.steppers import SHORTEST, FlowMap, StuckError, steps
@@ -37,12 +38,12 @@ def flow_to_first_event(point: Point, limit: float, time_event: float) -> tuple[
                     break
                 pieces.append(point.follow(piece))
         except StuckError:
-            reached = locator.reach_guard(end)
+            reached = reach_guard(point, end)
             if reached is None:
                 raise
             return [*pieces, reached], False
     if pieces and (point.t == end or point.t + instant(point, point.t) > end):  # line 15
-        locator.raise_levels(pieces[-1])
+        raise_levels(point, pieces[-1])
         if not left and point.t < end == time_event:
-            pieces.append(locator.go_on_to(end))
+            pieces.append(go_on_to(point, end))
     return pieces, left

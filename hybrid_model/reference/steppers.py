@@ -91,8 +91,7 @@ def steps(point: Point, end: float) -> Any:
     if point.t == point.t_start or point.sizes.max() == 0.0:
         _raise_floor(point, end)
     first = min(point.next_step or step_from(point, end), options.max_step, end - point.t)
-    stepper = _stepper(point, flow_map, end, first)
-    pace = Pace(point, end)
+    stepper, pace = _stepper(point, flow_map, end, first), Pace(point, end)
     while stepper.status == "running":
         t0, x0 = stepper.t, stepper.y
         flow_map.forget()
@@ -108,16 +107,16 @@ def steps(point: Point, end: float) -> Any:
             stepper = _stepper(point, flow_map, end, first)
             continue
         # LSODA calls a step done that went nowhere.
-        if stepper.status == "failed" or not stepper.t > t0:
-            if not flow_map.trouble and _raise_floor(point, end):
-                stepper = _stepper(point, flow_map, end, min(step_from(point, end), options.max_step))
-                continue
+        if stepper.status != "failed" and stepper.t > t0:
+            point.propose_step(getattr(stepper, "h_abs", None))
+            yield FlowPiece(t0, stepper.t, x0, stepper.y, stepper.dense_output())
+            stepper.atol = _absolute_tolerance(point, 0.0)
+            pace.check(stepper.t)
+        elif not flow_map.trouble and _raise_floor(point, end):
+            stepper = _stepper(point, flow_map, end, min(step_from(point, end), options.max_step))
+        else:
             kind = StuckError if flow_map.trouble else SimulationError
             raise kind(_failure(point, flow_map, t0, x0, problem or "the step length fell to zero"))
-        point.propose_step(getattr(stepper, "h_abs", None))
-        yield FlowPiece(t0, stepper.t, x0, stepper.y, stepper.dense_output())
-        stepper.atol = _absolute_tolerance(point, 0.0)
-        pace.check(stepper.t)
 
 
 def _stepper(point: Point, flow_map: FlowMap, end: float, first: float) -> Any:
