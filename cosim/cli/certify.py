@@ -11,7 +11,7 @@ from typing import Any
 import hybrid_model as hm
 from cosim.cli.exits import Exit, UsageError, exit_of, progress
 from hybrid_model.consensus.certificates.certify import Certificates, certify
-from hybrid_model.consensus.certificates.forms import Certified
+from hybrid_model.consensus.certificates.forms import Certified, Quantity
 from hybrid_model.consensus.figures.certificates import save_certificate_figures
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import load_scenario
@@ -21,13 +21,6 @@ SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-au
 """What the short names in the sources of values mean."""
 
 _MOST_JUMPS = 20_000
-
-_TITLES = {
-    "rate": "rate of convergence",
-    "transient": "factor of the rate",
-    "radius": "ultimate radius of ||x_e||",
-    "min_gap": "minimum time between broadcasts",
-}
 
 
 def add_parser(commands: Any) -> None:
@@ -84,9 +77,9 @@ def _document(found: Certificates, *, details: bool) -> dict[str, Any]:
 
 def _text(found: Certificates) -> str:
     lines = [f"{found.scenario.name}: certificates"]
-    for quantity, title in _TITLES.items():
-        rows = [value for value in found.values if value.quantity == quantity]
-        lines += ["", f"{title} [{rows[0].unit}]"]
+    for quantity in Quantity:
+        rows = [value for value in found.values if value.quantity is quantity]
+        lines += ["", f"{quantity.heading} [{rows[0].unit}]"]
         lines += [_row(value, found) for value in rows]
     mu1, mu2, window = (found.excitation[key] for key in ("mu1", "mu2", "T"))
     lines += ["", f"excitation of the tree's weights: mu1 {_number(mu1)}, mu2 {_number(mu2)}, T {_number(window)} s"]

@@ -1,4 +1,4 @@
-"""Radius and minimum gap of one scenario in every form, from one analysis."""
+"""Rate and radius of one scenario in every form, from one analysis."""
 
 from __future__ import annotations
 
@@ -6,19 +6,16 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.certificates.energy import energy_radius, initial_peaks
-from hybrid_model.consensus.certificates.envelopes import Envelope, envelope, sampled_threshold
-from hybrid_model.consensus.certificates.gaps import excited_gap, frozen_gap, growing_gap, printed_gap
-from hybrid_model.consensus.certificates.rates import rate_of_contraction
+from hybrid_model.consensus.certificates.envelopes import Envelope, error_envelope, sampled_threshold
+from hybrid_model.consensus.certificates.rates import tree_free_rate
 from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound, convergence_bound
 from hybrid_model.consensus.exact.worst_case import WorstCase
-from hybrid_model.consensus.graphs.undirected import incidence
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
@@ -26,12 +23,6 @@ __all__ = ["Bounds", "with_threshold"]
 
 _LEAST_FORGOTTEN = 1e-7
 """``(r - beta) C`` below which more cycles C count than `ReachableSets` adds up."""
-
-
-class _PartGap(Protocol):
-    def __call__(
-        self, c: float, decay: float, *, with_initial: bool, threshold: float | None = None
-    ) -> float | None: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,29 +37,31 @@ class Bounds:
 
     # --- rates -------------------------------------------------------------------------------------------------------
 
-    def tree_bound(self, form: BoundForm) -> ConvergenceBound:
-        """Theorem 2 along the tree of the analysis, for the trigger's own threshold and decay."""
-        return self._bound(self.analysis.scenario, form)
-
-    def _bound(self, scenario: Scenario, form: BoundForm) -> ConvergenceBound:
-        analysis = self.analysis
-        constants = analysis.tree_weights if form is BoundForm.PRINTED else analysis.tree_coordinates
-        return convergence_bound(scenario, form, analysis.tree, analysis.window, constants)
-
     @cached_property
     def printed(self) -> ConvergenceBound:
-        """As printed."""
-        return self.tree_bound(BoundForm.PRINTED)
+        """Theorem 2 along the tree of the analysis, as printed."""
+        analysis = self.analysis
+        return convergence_bound(
+            analysis.scenario, BoundForm.PRINTED, analysis.tree, analysis.window, analysis.tree_weights
+        )
 
     @cached_property
     def valid(self) -> ConvergenceBound:
-        """As valid."""
-        return self.tree_bound(BoundForm.VALID)
+        """The same as valid."""
+        return self._valid(self.analysis.scenario)
+
+    def theorem(self, c: float, decay: float) -> ConvergenceBound:
+        """Theorem 2 in the valid form for another threshold, ``c exp(-decay t)``."""
+        return self._valid(with_threshold(self.analysis.scenario, c, decay))
+
+    def _valid(self, scenario: Scenario) -> ConvergenceBound:
+        analysis = self.analysis
+        return convergence_bound(scenario, BoundForm.VALID, analysis.tree, analysis.window, analysis.tree_coordinates)
 
     @cached_property
     def improved_rate(self) -> float:
         """Rate [1/s] of the tree-free gamma* (audit, section 3 (ii)); 0.0 without persistent excitation."""
-        return rate_of_contraction(self.analysis.improved_contraction, self.analysis.window)
+        return tree_free_rate(self.analysis.disagreement, self.analysis.scenario.network.gain)
 
     @cached_property
     def floquet_rate(self) -> float | None:
@@ -84,25 +77,25 @@ class Bounds:
     # --- errors ------------------------------------------------------------------------------------------------------
 
     @cached_property
-    def parts(self) -> Envelope | None:
+    def envelope(self) -> Envelope | None:
         """Pairs (c, beta) that bound the errors, see `envelope`; None if there are none."""
         scenario = self.analysis.scenario
         if scenario.trigger.kind is not TriggerKind.SAMPLED or not scenario.channel.ideal:
-            return envelope(scenario)
+            return error_envelope(scenario)
         reach = self._sampled_reach
         if reach is None:
             return None
         decay = scenario.trigger.decay
         degrees = self.analysis.moved_degrees().tolist()
         omega = float(np.max(self.analysis.largest_weights))
-        c = sampled_threshold(scenario, reach, self._peaks(decay)[0], degrees, omega)
+        c = sampled_threshold(scenario, reach, self.initial_peaks(decay)[0], degrees, omega)
         return None if c is None else ((c, decay),)
 
     @property
     def _sampled_reach(self) -> float | None:
         """R for the threshold ``exp(-beta t)``: the lesser of the exact radius and the energy bound."""
         decay = self.analysis.scenario.trigger.decay
-        worst, energy = self._worst(decay), energy_radius(self.analysis, decay)
+        worst, energy = self.worst(decay), energy_radius(self.analysis, decay)
         return None if worst is None or energy is None else min(worst.radius * worst.cover, energy)
 
     @property
@@ -118,7 +111,8 @@ class Bounds:
         speed = trigger.period * scenario.network.gain * float(np.max(self.analysis.largest_weights))
         return math.exp(trigger.decay * trigger.period) * speed * (math.sqrt(degree) * reach + 2 * degree)
 
-    def _worst(self, decay: float) -> WorstCase | None:
+    def worst(self, decay: float) -> WorstCase | None:
+        """The exact worst case for the threshold ``exp(-decay t)``; None if it does not exist or is out of reach."""
         rate = self.floquet_rate
         if rate is not None and (decay >= rate or self.is_beyond_reach(decay)):
             return None
@@ -129,7 +123,8 @@ class Bounds:
         rate = self.floquet_rate
         return rate is not None and 0 < (rate - decay) * self.analysis.cycle < _LEAST_FORGOTTEN
 
-    def _peaks(self, decay: float) -> tuple[float, NDArray[np.float64]]:
+    def initial_peaks(self, decay: float) -> tuple[float, NDArray[np.float64]]:
+        """How large the share of the initial state gets, see `energy.initial_peaks`; kept for further calls."""
         known: dict[float, tuple[float, NDArray[np.float64]]] = self.__dict__.setdefault("_known_peaks", {})
         if decay not in known:
             known[decay] = initial_peaks(self.analysis, decay)
@@ -138,20 +133,20 @@ class Bounds:
     @property
     def slowest(self) -> Envelope:
         """The parts of the errors that decay most slowly: they decide about the radius."""
-        parts = self.parts or ()
-        return tuple((c, decay) for c, decay in parts if decay == min(b for _, b in parts))
+        terms = self.envelope or ()
+        return tuple((c, decay) for c, decay in terms if decay == min(b for _, b in terms))
 
     @property
     def passing_radii(self) -> tuple[tuple[float, float], ...]:
         """Pairs (R, b): the parts of the errors that decay faster than the slowest add at most ``R exp(-b t)``."""
         found = []
-        for c, decay in self.parts or ():
+        for c, decay in self.envelope or ():
             if (c, decay) in self.slowest:
                 continue
             # Beyond the rate no radius exists; the same part is also below one that decays half as fast as the rate.
-            worst = self._worst(decay)
+            worst = self.worst(decay)
             carrier = decay if worst is not None else 0.5 * (self.floquet_rate or 0.0)
-            worst = worst or self._worst(carrier)
+            worst = worst or self.worst(carrier)
             if worst is not None:
                 found.append((c * worst.radius * worst.cover, carrier))
         return tuple(found)
@@ -161,19 +156,16 @@ class Bounds:
     @property
     def printed_radius(self) -> float | None:
         """``rho kappa_2`` as printed; None unless beta is below the printed rate."""
-        bound = self.printed
-        return None if bound.kappa2 is None else bound.rho * bound.kappa2
+        return self.printed.rho_kappa2
 
     @property
     def valid_radius(self) -> float | None:
         """``rho kappa_2*`` (audit, section 5.2); None unless beta is below the valid rate."""
-        return self._sum(self._valid_part)
+        return self._sum(self._unit_valid_radius)
 
-    def _valid_part(self, decay: float) -> float | None:
-        bound = self._part_bound(1.0, decay)
-        if bound.kappa2 is None or decay >= bound.rate:
-            return None
-        return bound.rho * bound.kappa2
+    def _unit_valid_radius(self, decay: float) -> float | None:
+        bound = self.theorem(1.0, decay)
+        return bound.rho_kappa2 if decay < bound.rate else None
 
     @property
     def improved_radius(self) -> float | None:
@@ -181,13 +173,13 @@ class Bounds:
         analysis, root = self.analysis, math.sqrt(1 - self.analysis.improved_contraction)
         strength = analysis.edge_gain * analysis.box_gain * analysis.scenario.network.gain
 
-        def part(decay: float) -> float | None:
+        def unit_radius(decay: float) -> float | None:
             growth = math.exp(min(decay * analysis.window, 700.0))
             return (
                 strength * analysis.disagreement.mu2_bar * growth / (1 - growth * root) if growth * root < 1 else None
             )
 
-        return self._sum(part)
+        return self._sum(unit_radius)
 
     @property
     def energy_radius(self) -> float | None:
@@ -197,147 +189,28 @@ class Bounds:
     @property
     def exact_radius(self) -> float | None:
         """See `hybrid_model.consensus.exact.worst_case`."""
-        return self._sum(self.exact_part)
+        return self._sum(self.unit_exact_radius)
 
-    def exact_part(self, decay: float) -> float | None:
+    def unit_exact_radius(self, decay: float) -> float | None:
         """The exact radius for the threshold ``exp(-decay t)``; None if it does not exist."""
-        worst = self._worst(decay)
+        worst = self.worst(decay)
         return None if worst is None else worst.radius
 
     @property
     def exact_worst(self) -> WorstCase | None:
         """The worst case behind the exact radius, for the slowest part of the errors; None without one."""
-        return self._worst(self.slowest[0][1]) if self.slowest else None
+        return self.worst(self.slowest[0][1]) if self.slowest else None
 
-    def _sum(self, part: Callable[[float], float | None]) -> float | None:
-        if self.parts is None:
+    def _sum(self, unit_radius: Callable[[float], float | None]) -> float | None:
+        if self.envelope is None:
             return None
         total = 0.0
         for c, decay in self.slowest:
-            radius = part(decay)
+            radius = unit_radius(decay)
             if radius is None:
                 return None
             total += c * radius
         return total
-
-    # --- minimum gap -------------------------------------------------------------------------------------------------
-
-    @property
-    def printed_gap(self) -> float | None:
-        """The paper's closing formula; None unless beta is below the printed rate."""
-        bound, trigger = self.printed, self.analysis.scenario.trigger
-        if bound.kappa1 is None or bound.kappa2 is None or bound.kappa1 + bound.kappa2 <= 0:
-            return None
-        return printed_gap(trigger.threshold, trigger.decay, self.printed_speed, bound.kappa1, bound.kappa2)
-
-    @property
-    def printed_speed(self) -> float:
-        """``k rho omega ||D||`` [1/s] of the printed gap."""
-        network = self.analysis.scenario.network
-        norm = float(np.linalg.norm(incidence(network.agents, network.underlying_edges), 2))
-        return network.gain * self.printed.rho * float(np.max(self.analysis.largest_weights)) * norm
-
-    @property
-    def valid_gap(self) -> float | None:
-        """Lambert form with the valid radius and the degrees (audit, section 6)."""
-        return self._least_gap(self._valid_part_gap)
-
-    @property
-    def improved_gap(self) -> float | None:
-        """Logarithmic form with the best bound per edge, or the excitation-aware form if it is larger."""
-        return self._least_gap(self._improved_part_gap)
-
-    def gap_until(self, end: float) -> float | None:
-        """A gap [s] that no two broadcasts up to `end` [s] fall short of, for every beta >= 0 (audit, section 6)."""
-        parts = self.parts
-        if not parts or self._worst(0.0) is None:
-            return None
-        last = sum(c * math.exp(-decay * end) for c, decay in parts)
-        return self._improved_part_gap(sum(c for c, _ in parts), 0.0, with_initial=True, threshold=last)
-
-    def _least_gap(self, part: _PartGap) -> float | None:
-        trigger, gap = self.analysis.scenario.trigger, self._threshold_gap(part)
-        if trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC):
-            # Whatever the errors do, broadcasts are at multiples of the period.
-            return max(gap or 0.0, trigger.period)
-        return gap
-
-    def _threshold_gap(self, part: _PartGap) -> float | None:
-        parts = self.parts
-        if not parts:
-            return None
-        carrier = min(decay for _, decay in parts)
-        trigger = self.analysis.scenario.trigger
-        # Sampled checks let errors grow beyond the threshold, and still a broadcast needs an error of the threshold.
-        level = trigger.threshold if trigger.kind is TriggerKind.SAMPLED else None
-        gaps = [part(c, decay, with_initial=decay == carrier, threshold=level) for c, decay in parts]
-        known = [gap for gap in gaps if gap is not None]
-        found = [min(known)] if len(known) == len(parts) else []
-        # Errors also stay below the sum of all c, and thresholds above those that do not decay.
-        lasting = sum(c for c, decay in parts if decay == 0)
-        if lasting and len(parts) > 1:
-            whole = part(sum(c for c, _ in parts), 0.0, with_initial=True, threshold=lasting)
-            found += [] if whole is None else [whole]
-        gap = max(found, default=math.inf)
-        return gap if math.isfinite(gap) else None
-
-    def _valid_part_gap(
-        self, c: float, decay: float, *, with_initial: bool, threshold: float | None = None
-    ) -> float | None:
-        bound = self._part_bound(c, decay)
-        if bound.kappa1 is None or bound.kappa2 is None or decay >= bound.rate:
-            return None
-        start = max(bound.kappa1, 0.0) if with_initial else 0.0
-        speeds = self._speeds_by_degree(bound.rho * (start + bound.kappa2), c)
-        return frozen_gap(c if threshold is None else threshold, decay, float(np.max(speeds)))
-
-    def _improved_part_gap(
-        self, c: float, decay: float, *, with_initial: bool, threshold: float | None = None
-    ) -> float | None:
-        worst = self._worst(decay)
-        if worst is None:
-            return None
-        analysis, network = self.analysis, self.analysis.scenario.network
-        norm, pairs = self._peaks(decay) if with_initial else (0.0, np.zeros(len(network.edges)))
-        energy = energy_radius(analysis, decay)
-        radius = min(worst.radius * worst.cover, math.inf if energy is None else energy) * c + norm
-        bound = self._part_bound(c, decay)
-        if bound.kappa1 is not None and bound.kappa2 is not None and decay < bound.rate:
-            start = max(bound.kappa1, 0.0) if with_initial else 0.0
-            radius = min(radius, bound.rho * (start + bound.kappa2))
-        reached = worst.cover * np.array([worst.pairs[edge] for edge in network.edges])
-        widths = np.minimum(c * reached + pairs, radius)
-        by_degree = self._speeds_by_degree(radius, c)
-        per_edge = network.gain * (widths + 2 * c)
-        level = c if threshold is None else threshold
-        speeds = np.array(
-            [
-                min(
-                    float(by_degree[i - 1]),
-                    float(per_edge @ (analysis.largest_weights * [i in e for e in network.edges])),
-                )
-                for i in range(1, network.agents + 1)
-            ]
-        )
-        gap = math.inf
-        for place in np.argsort(-speeds).tolist():
-            safe = growing_gap(level, decay, float(speeds[place]))
-            if safe >= gap or analysis.is_constant:
-                gap = min(gap, safe)
-                continue
-            # A gap of a hundred cycles is as good as none: the search ends there.
-            most = min(gap, safe + 100 * analysis.cycle)
-            gap = excited_gap(analysis, level, decay, per_edge, place + 1, safe, most)
-        return gap
-
-    def _speeds_by_degree(self, radius: float, c: float) -> NDArray[np.float64]:
-        """``K_i = k omega (sqrt(d_i) R + 2 c d_i)`` of each agent."""
-        degrees = self.analysis.moved_degrees()
-        omega = float(np.max(self.analysis.largest_weights))
-        return np.asarray(self.analysis.scenario.network.gain * omega * (np.sqrt(degrees) * radius + 2 * c * degrees))
-
-    def _part_bound(self, c: float, decay: float) -> ConvergenceBound:
-        return self._bound(with_threshold(self.analysis.scenario, c, decay), BoundForm.VALID)
 
 
 def with_threshold(scenario: Scenario, c: float, decay: float) -> Scenario:

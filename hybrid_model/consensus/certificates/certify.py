@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,8 +10,13 @@ from hybrid_model import HybridArc, Stop
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.components import component_scenarios, connected_components
-from hybrid_model.consensus.certificates.forms import FORMS, Certified, certified_values
-from hybrid_model.consensus.certificates.hypotheses import Hypothesis, bound_hypotheses, network_hypotheses
+from hybrid_model.consensus.certificates.forms import BOUNDS, Certified, Form, Quantity, certified_values
+from hybrid_model.consensus.certificates.hypotheses import (
+    CheckedHypothesis,
+    Hypothesis,
+    bound_hypotheses,
+    network_hypotheses,
+)
 from hybrid_model.consensus.certificates.notes import scenario_notes
 from hybrid_model.consensus.certificates.observation import observe
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
@@ -18,12 +24,6 @@ from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = ["Certificates", "certify"]
-
-_JSON_FORMS = {
-    "rate": ("printed", "valid", "improved", "floquet"),
-    "radius": ("printed", "valid", "energy", "exact", "observed"),
-    "min_gap": ("printed", "valid", "improved", "observed"),
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +36,7 @@ class Certificates:
         What was certified.
     values : tuple of Certified
         All bounds in all forms.
-    hypotheses : tuple of Hypothesis
+    hypotheses : tuple of CheckedHypothesis
         All that were checked.
     excitation : dict
         ``mu1``, ``mu2`` of the tree's weights and the window ``T`` [s]; None where unknown.
@@ -48,21 +48,24 @@ class Certificates:
 
     scenario: Scenario
     values: tuple[Certified, ...]
-    hypotheses: tuple[Hypothesis, ...]
+    hypotheses: tuple[CheckedHypothesis, ...]
     excitation: dict[str, float | None]
     notes: tuple[str, ...]
     tree: tuple[int, ...] = ()
 
     def value(self, quantity: str, form: str) -> float | None:
         """The value of one bound; KeyError if there is no such form."""
-        for certified in self.values:
-            if (certified.quantity, certified.form) == (quantity, form):
-                return certified.value
-        raise KeyError(f"there is no {form} {quantity}.")
+        known: dict[tuple[str, str], float | None] = {(each.quantity, each.form): each.value for each in self.values}
+        if (quantity, form) not in known:
+            raise KeyError(f"there is no {form} {quantity}.")
+        return known[quantity, form]
 
     def as_dict(self) -> dict[str, Any]:
         """The object that ``certify --json`` prints."""
-        table = {quantity: {f: self.value(quantity, f) for f in forms} for quantity, forms in _JSON_FORMS.items()}
+        table: dict[str, dict[str, float | None]] = {}
+        for row in BOUNDS:
+            if row.in_json:
+                table.setdefault(row.quantity, {})[row.form] = self.value(row.quantity, row.form)
         return {**table, "pe": dict(self.excitation), "notes": list(self.notes)}
 
 
@@ -93,7 +96,7 @@ def certify(
     cycle = scenario.stop_time if period is None else period or 1.0
     general = network_hypotheses(scenario, cycle)
     if len(connected_components(scenario, cycle)) > 1:
-        return _in_parts(scenario, arc, general, cycle, resolution)
+        return _in_components(scenario, arc, general, cycle, resolution)
     analysis = analyse(scenario, tree, window, resolution)
     bounds = Bounds(analysis)
     # Where no radius exists, there is nothing to compare an observed one with.
@@ -115,55 +118,63 @@ def certify(
     )
 
 
-def _in_parts(
-    scenario: Scenario, arc: HybridArc | None, hypotheses: list[Hypothesis], cycle: float, resolution: float
+def _in_components(
+    scenario: Scenario, arc: HybridArc | None, hypotheses: list[CheckedHypothesis], cycle: float, resolution: float
 ) -> Certificates:
-    """No consensus of all: what holds for each part by itself."""
-    broken = hypotheses[0]
-    left = "There is no consensus of all agents; each part keeps its own mean."
-    notes = [f"Hypothesis '{broken.name}' fails: {broken.detail} {left}"]
-    gaps: dict[str, list[float | None]] = {"valid": [], "improved": []}
+    """No consensus of all: what holds for each connected component by itself."""
+    joined, *others = hypotheses
+    notes = [f"{joined.failure} There is no consensus of all agents; each part keeps its own mean."]
+    failed = {hypothesis.name for hypothesis in hypotheses if not hypothesis.holds}
+    gaps: dict[str, list[float | None]] = {Form.VALID: [], Form.IMPROVED: []}
     touched = {agent for edge in _positive_edges(scenario, cycle) for agent in edge}
-    for part, alone in component_scenarios(scenario, cycle):
-        if alone is None and part[0] in touched:
-            notes.append(f"Agent {part[0]} by itself: its edges count as absent, and nothing is certified about it.")
+    for agents, alone in component_scenarios(scenario, cycle):
+        if alone is not None:
+            inner = certify(alone, resolution=resolution)
+            notes += _component_notes(agents, inner, failed)
+            for form, found in gaps.items():
+                found.append(inner.value(Quantity.MIN_GAP, form))
+        elif agents[0] in touched:
+            notes.append(f"Agent {agents[0]} by itself: its edges count as absent, and nothing is certified about it.")
             for found in gaps.values():
                 found.append(None)
-            continue
-        if alone is None:
-            notes.append(f"Agent {part[0]} never moves and never broadcasts.")
-            continue
-        inner = certify(alone, resolution=resolution)
-        for form, found in gaps.items():
-            found.append(inner.value("min_gap", form))
-        rate, radius = inner.value("rate", "floquet"), inner.value("radius", "exact")
-        gap = inner.value("min_gap", "improved")
-        who = f"Agents {', '.join(map(str, part))} by themselves:"
-        notes.append(
-            f"{who} Floquet rate {_text(rate, '1/s')}, exact radius over their own edges "
-            f"{_text(radius, 'units of x')}, minimum gap {_text(gap, 's')}."
+        else:
+            notes.append(f"Agent {agents[0]} never moves and never broadcasts.")
+    known = {form: _least(found) for form, found in gaps.items()}
+    known[Form.OBSERVED] = None if arc is None else run_report(scenario, arc).min_gap
+    values = tuple(
+        Certified(
+            row.quantity,
+            row.form,
+            known.get(row.form) if row.quantity is Quantity.MIN_GAP else None,
+            row.quantity.unit,
+            "",
+            (Hypothesis.CONNECTED_UNION,),
         )
-        own = {hypothesis.name for hypothesis in hypotheses if not hypothesis.holds}
-        notes += [
-            f"{who} hypothesis '{h.name}' fails: {h.detail}"
-            for h in inner.hypotheses
-            if not h.holds and h.name not in own
-        ]
-    least: dict[str, float | None] = {}
-    for form, found in gaps.items():
-        known = [gap for gap in found if gap is not None]
-        least[form] = min(known) if known and len(known) == len(found) else None
-    observed = None if arc is None else run_report(scenario, arc).min_gap
-    values = []
-    for quantity, forms in FORMS.items():
-        for form in forms:
-            value = {"observed": observed, **least}.get(form) if quantity == "min_gap" else None
-            unit = {"rate": "1/s", "radius": "unit of x", "min_gap": "s", "transient": "1"}[quantity]
-            values.append(Certified(quantity, form, value, unit, "", ("connected union",)))
-    notes += [f"Hypothesis '{h.name}' fails: {h.detail}" for h in hypotheses[1:] if not h.holds]
-    notes += _early_end(arc)
+        for row in BOUNDS
+    )
+    notes += [hypothesis.failure for hypothesis in others if not hypothesis.holds]
     empty: dict[str, float | None] = {"mu1": 0.0, "mu2": None, "T": cycle}
-    return Certificates(scenario, tuple(values), tuple(hypotheses), empty, tuple(notes))
+    return Certificates(scenario, values, tuple(hypotheses), empty, (*notes, *_early_end(arc)))
+
+
+def _component_notes(agents: list[int], inner: Certificates, known: set[Hypothesis]) -> Iterator[str]:
+    """The numbers of a component, and the hypotheses that fail for it and are not `known` to fail for all."""
+    rate, radius = inner.value(Quantity.RATE, Form.FLOQUET), inner.value(Quantity.RADIUS, Form.EXACT)
+    gap = inner.value(Quantity.MIN_GAP, Form.IMPROVED)
+    who = f"Agents {', '.join(map(str, agents))} by themselves:"
+    yield (
+        f"{who} Floquet rate {_text(rate, '1/s')}, exact radius over their own edges "
+        f"{_text(radius, 'units of x')}, minimum gap {_text(gap, 's')}."
+    )
+    for each in inner.hypotheses:
+        if not each.holds and each.name not in known:
+            yield f"{who} hypothesis '{each.name}' fails: {each.detail}"
+
+
+def _least(gaps: list[float | None]) -> float | None:
+    """The least gap if all are known."""
+    known = [gap for gap in gaps if gap is not None]
+    return min(known) if known and len(known) == len(gaps) else None
 
 
 def _early_end(arc: HybridArc | None) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
 from hybrid_model.consensus.switching.base import NoSwitching
 
-__all__ = ["active_edges", "component_scenarios", "connected_components"]
+__all__ = ["active_edges", "component_scenarios", "connected_components", "joined_agents", "listed"]
 
 _SPREAD = 1e-12
 """Share of the largest integral below which an edge's integral counts as zero (rounding)."""
@@ -25,10 +26,20 @@ def active_edges(scenario: Scenario, cycle: float) -> list[int]:
 
 def connected_components(scenario: Scenario, cycle: float) -> list[list[int]]:
     """Agents, from 1, of each connected part of the union of the graphs over ``[0, cycle]`` [s]."""
+    return joined_agents(scenario, active_edges(scenario, cycle))
+
+
+def joined_agents(scenario: Scenario, edges: Iterable[int]) -> list[list[int]]:
+    """Agents, from 1, that some of the listed edges, from 0, join: the connected components."""
     graph: nx.Graph[int] = nx.Graph()
     graph.add_nodes_from(range(1, scenario.network.agents + 1))
-    graph.add_edges_from(scenario.network.edges[edge] for edge in active_edges(scenario, cycle))
-    return sorted(sorted(part) for part in nx.connected_components(graph))
+    graph.add_edges_from(scenario.network.edges[edge] for edge in edges)
+    return sorted(sorted(agents) for agents in nx.connected_components(graph))
+
+
+def listed(components: list[list[int]]) -> str:
+    """Components as the text of a sentence."""
+    return " and ".join("{" + ", ".join(map(str, agents)) + "}" for agents in components)
 
 
 def component_scenarios(scenario: Scenario, cycle: float) -> list[tuple[list[int], Scenario | None]]:

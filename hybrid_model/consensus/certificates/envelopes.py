@@ -7,13 +7,13 @@ import math
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 
-__all__ = ["Envelope", "envelope", "sampled_threshold"]
+__all__ = ["Envelope", "error_envelope", "sampled_threshold"]
 
 Envelope = tuple[tuple[float, float], ...]
 """Pairs (c, beta): ``|e_i(t)| <= sum of c exp(-beta t)``."""
 
 
-def envelope(scenario: Scenario) -> Envelope | None:
+def error_envelope(scenario: Scenario) -> Envelope | None:
     """The bound on the errors that the trigger law enforces at every time; None if there is none known in advance.
 
     An empty sum means that there are no errors. With sampled checks the error overshoots the threshold between two

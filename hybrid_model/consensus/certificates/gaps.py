@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import lambertw
 
-from hybrid_model.consensus.certificates.analysis import Analysis
-from hybrid_model.consensus.weights.edge_weights import EdgeWeights
+from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.energy import energy_radius
+from hybrid_model.consensus.certificates.excited_gap import excited_gap
+from hybrid_model.consensus.graphs.undirected import incidence
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 
-__all__ = ["excited_gap", "frozen_gap", "growing_gap", "printed_gap"]
-
-_ACCURACY = 1e-5
-_FINE = 4000
-_RISE = 1e-4
-"""Share of the integral by which the bound between two starts may exceed what is found at the starts."""
+__all__ = ["Gaps", "frozen_gap", "growing_gap", "printed_gap"]
 
 
 def printed_gap(threshold: float, decay: float, speed: float, kappa1: float, kappa2: float) -> float:
@@ -60,90 +60,134 @@ def growing_gap(threshold: float, decay: float, speed: float) -> float:
     return math.log1p(decay * threshold / speed) / decay
 
 
-def excited_gap(
-    analysis: Analysis, threshold: float, decay: float, speeds: NDArray[np.float64], agent: int, low: float, high: float
-) -> float:
-    """Largest g [s] from `low` to `high` for which no window of length g moves the agent by its threshold.
-
-    The agent moves by at most ``sum_e speeds[e] int w_e`` in units of ``e^{-beta t1}``, so a gap from t1 to ``t1 + g``
-    needs that sum to reach ``c e^{-beta g}``.
+@dataclass(frozen=True)
+class _Term:
+    """An exponential ``c exp(-decay t)`` of the bound on the errors, and what a gap has to know of it.
 
     Parameters
     ----------
-    analysis : Analysis
-        The scenario.
-    threshold, decay : float
-        c and beta [1/s].
-    speeds : ndarray, shape (m,)
-        ``k (H_e + 2 c)`` with ``|x_i - x_j| <= H_e e^{-beta t}`` over edge e.
-    agent : int
-        Number of the agent, from 1.
-    low : float
-        A gap [s] that is known to be safe; returned if nothing larger is.
-    high : float
-        Largest gap [s] of interest, finite.
+    c, decay : float
+        The term.
+    level : float
+        A broadcast needs an error of ``level exp(-decay t)``.
+    has_start : bool
+        Whether the share of the initial state counts with this term.
     """
-    network, weights = analysis.scenario.network, analysis.scenario.edge_weights
-    rates = np.array([speed if agent in edge else 0.0 for edge, speed in zip(network.edges, speeds, strict=True)])
-    steepest = _steepest(analysis, rates)
 
-    def is_safe(gap: float) -> bool:
-        level = threshold * math.exp(-decay * gap)
-        return _moved(weights, rates, analysis, gap, steepest, level) < level
-
-    if is_safe(high):
-        return high
-    # Most gaps are far below the longest of interest.
-    while 2 * low < high and is_safe(2 * low):
-        low *= 2
-    high = min(high, 2 * low)
-    while high - low > _ACCURACY * low:
-        middle = (low + high) / 2
-        low, high = (middle, high) if is_safe(middle) else (low, middle)
-    return low
+    c: float
+    decay: float
+    level: float
+    has_start: bool
 
 
-def _moved(
-    weights: EdgeWeights,
-    rates: NDArray[np.float64],
-    analysis: Analysis,
-    length: float,
-    steepest: float | None,
-    level: float,
-) -> float:
-    """Supremum over the starts t1 of ``sum rates*int_{t1}^{t1+length} w``, never too small; or a value above `level`.
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Minimum gaps [s] in every form, from the bounds on the states; None where one does not exist."""
 
-    Between two starts h apart, with no corner of a weight between them, the sum rises above the larger of its end
-    values by at most ``h^2/8`` times the bound of its second derivative, which is twice that of the slope of the
-    weights.
-    """
-    cycle = analysis.cycle
-    last = cycle if analysis.is_periodic else max(cycle - length, 0.0)
-    corners = np.concatenate(
-        ([0.0, last], weights.breakpoints(0.0, last), weights.breakpoints(length, last + length) - length)
-    )
-    corners = np.unique(np.clip(corners, 0.0, last))
-    largest = float(np.max(weights.integral(corners, corners + length) @ rates))
-    if largest >= level or steepest == 0.0 or len(corners) == 1:
-        return largest
-    if steepest is None:
-        # Nothing is known of the slope: the sum itself changes no faster than the largest weights say.
-        starts = np.unique(np.append(np.linspace(0.0, last, _FINE), corners))
-        between = 0.5 * float(rates @ analysis.largest_weights) * float(np.max(np.diff(starts)))
-        return float(np.max(weights.integral(starts, starts + length) @ rates)) + between
-    step = max(math.sqrt(4 * _RISE * largest / steepest), last / _FINE)
-    counts = np.ceil(np.diff(corners) / step).astype(int)
-    inner = [np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(corners[:-1], corners[1:], counts, strict=True)]
-    starts = np.append(np.concatenate(inner), last)
-    rise = steepest / 4 * float(np.max(np.diff(starts))) ** 2
-    return float(np.max(weights.integral(starts, starts + length) @ rates)) + rise
+    bounds: Bounds
 
+    @property
+    def printed(self) -> float | None:
+        """The paper's closing formula; None unless beta is below the printed rate."""
+        bound, trigger = self.bounds.printed, self.bounds.analysis.scenario.trigger
+        if bound.kappa1 is None or bound.kappa2 is None or bound.kappa1 + bound.kappa2 <= 0:
+            return None
+        return printed_gap(trigger.threshold, trigger.decay, self.printed_speed, bound.kappa1, bound.kappa2)
 
-def _steepest(analysis: Analysis, rates: NDArray[np.float64]) -> float | None:
-    """Bound on ``|sum rates*w'|`` between the corners of the weights; None if a carrier's slope is not known."""
-    pieces = analysis.scenario.edge_weights.pieces(0.0, analysis.cycle)
-    amplitudes = np.max([piece.amplitudes for piece in pieces], axis=0)
-    slopes = [carrier.steepness for carrier in analysis.scenario.edge_weights.carriers]
-    if any(slope is None for slope in slopes):
-        return None
-    return float(np.sum(rates * amplitudes * np.array(slopes, dtype=float)))
+    @property
+    def printed_speed(self) -> float:
+        """``k rho omega ||D||`` [1/s] of the printed gap."""
+        analysis = self.bounds.analysis
+        network = analysis.scenario.network
+        norm = float(np.linalg.norm(incidence(network.agents, network.underlying_edges), 2))
+        return network.gain * self.bounds.printed.rho * float(np.max(analysis.largest_weights)) * norm
+
+    @property
+    def valid(self) -> float | None:
+        """Lambert form with the valid radius and the degrees (audit, section 6)."""
+        return self._least(self._valid)
+
+    @property
+    def improved(self) -> float | None:
+        """Logarithmic form with the best bound per edge, or the excitation-aware form if it is larger."""
+        return self._least(self._improved)
+
+    def until(self, end: float) -> float | None:
+        """A gap [s] that no two broadcasts up to `end` [s] fall short of, for every beta >= 0 (audit, section 6)."""
+        envelope = self.bounds.envelope
+        if not envelope or self.bounds.worst(0.0) is None:
+            return None
+        last = sum(c * math.exp(-decay * end) for c, decay in envelope)
+        return self._improved(_Term(sum(c for c, _ in envelope), 0.0, last, has_start=True))
+
+    def _least(self, gap_of: Callable[[_Term], float | None]) -> float | None:
+        trigger, gap = self.bounds.analysis.scenario.trigger, self._of_thresholds(gap_of)
+        if trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC):
+            # Whatever the errors do, broadcasts are at multiples of the period.
+            return max(gap or 0.0, trigger.period)
+        return gap
+
+    def _of_thresholds(self, gap_of: Callable[[_Term], float | None]) -> float | None:
+        envelope, trigger = self.bounds.envelope, self.bounds.analysis.scenario.trigger
+        if not envelope:
+            return None
+        slowest = min(decay for _, decay in envelope)
+        # Sampled checks let errors grow beyond the threshold, and still a broadcast needs an error of the threshold.
+        is_sampled = trigger.kind is TriggerKind.SAMPLED
+        gaps = [
+            gap_of(_Term(c, decay, trigger.threshold if is_sampled else c, has_start=decay == slowest))
+            for c, decay in envelope
+        ]
+        known = [gap for gap in gaps if gap is not None]
+        found = [min(known)] if len(known) == len(gaps) else []
+        # Errors also stay below the sum of all c, and thresholds above those that do not decay.
+        lasting = sum(c for c, decay in envelope if decay == 0)
+        if lasting and len(envelope) > 1:
+            whole = gap_of(_Term(sum(c for c, _ in envelope), 0.0, lasting, has_start=True))
+            found += [] if whole is None else [whole]
+        gap = max(found, default=math.inf)
+        return gap if math.isfinite(gap) else None
+
+    def _valid(self, term: _Term) -> float | None:
+        radius = self._theorem_radius(term)
+        if radius is None:
+            return None
+        return frozen_gap(term.level, term.decay, float(np.max(self._speeds_by_degree(radius, term.c))))
+
+    def _improved(self, term: _Term) -> float | None:
+        worst = self.bounds.worst(term.decay)
+        if worst is None:
+            return None
+        analysis, c, decay = self.bounds.analysis, term.c, term.decay
+        network = analysis.scenario.network
+        norm, pairs = self.bounds.initial_peaks(decay) if term.has_start else (0.0, np.zeros(len(network.edges)))
+        energy, theorem = energy_radius(analysis, decay), self._theorem_radius(term)
+        radius = min(worst.radius * worst.cover, math.inf if energy is None else energy) * c + norm
+        radius = radius if theorem is None else min(radius, theorem)
+        reached = worst.cover * np.array([worst.pairs[edge] for edge in network.edges])
+        per_edge = network.gain * (np.minimum(c * reached + pairs, radius) + 2 * c)
+        touches = np.array([[i in edge for edge in network.edges] for i in range(1, network.agents + 1)])
+        speeds = np.minimum(self._speeds_by_degree(radius, c), (touches * analysis.largest_weights) @ per_edge)
+        gap = math.inf
+        for place in np.argsort(-speeds).tolist():
+            safe = growing_gap(term.level, decay, float(speeds[place]))
+            if safe >= gap or analysis.is_constant:
+                gap = min(gap, safe)
+                continue
+            # A gap of a hundred cycles is as good as none: the search ends there.
+            most = min(gap, safe + 100 * analysis.cycle)
+            gap = excited_gap(analysis, term.level, decay, per_edge, place + 1, safe, most)
+        return gap
+
+    def _theorem_radius(self, term: _Term) -> float | None:
+        """``rho (kappa_1 + kappa_2)`` of the valid form, kappa_1 where the initial state counts; None without it."""
+        bound = self.bounds.theorem(term.c, term.decay)
+        if bound.kappa1 is None or bound.kappa2 is None or term.decay >= bound.rate:
+            return None
+        return bound.rho * ((max(bound.kappa1, 0.0) if term.has_start else 0.0) + bound.kappa2)
+
+    def _speeds_by_degree(self, radius: float, c: float) -> NDArray[np.float64]:
+        """``K_i = k omega (sqrt(d_i) R + 2 c d_i)`` of each agent."""
+        analysis = self.bounds.analysis
+        degrees, omega = analysis.moved_degrees(), float(np.max(analysis.largest_weights))
+        return np.asarray(analysis.scenario.network.gain * omega * (np.sqrt(degrees) * radius + 2 * c * degrees))

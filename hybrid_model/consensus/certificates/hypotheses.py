@@ -2,38 +2,57 @@
 
 from __future__ import annotations
 
+import enum
 from dataclasses import dataclass
 
-import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
-from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.certificates.bounds import Bounds
-from hybrid_model.consensus.certificates.components import active_edges, connected_components
-from hybrid_model.consensus.certificates.envelopes import envelope
-from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
+from hybrid_model.consensus.certificates.components import active_edges, connected_components, listed
+from hybrid_model.consensus.certificates.envelopes import error_envelope
+from hybrid_model.consensus.certificates.idle_windows import idle_tree_edges, idle_window
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 
-__all__ = ["PAPER_LAWS", "Hypothesis", "bound_hypotheses", "network_hypotheses"]
+__all__ = ["CheckedHypothesis", "Hypothesis", "bound_hypotheses", "follows_paper", "network_hypotheses"]
 
-PAPER_LAWS = (TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.SELF_TRIGGERED)
+_PAPER_LAWS = (TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.SELF_TRIGGERED)
 """Laws whose runs are those of the paper's static or dynamic trigger."""
 
-_ZERO = 1e-12
-_BETWEEN = 8
-"""Starts of windows that are tried between two corners of the weights."""
+
+class Hypothesis(enum.StrEnum):
+    """A hypothesis of the convergence results: the words that tell the user, and where it is stated."""
+
+    source: str
+
+    CONNECTED_UNION = "connected union", "paper, theorem 2 and corollary 1"
+    PERIODIC_WEIGHTS = "periodic weights", "audit, section 7"
+    PAPER_TRIGGER = "trigger of the paper", "paper, section 4"
+    IDEAL_CHANNEL = "ideal channel", "paper, section 4"
+    BOUNDED_ERRORS = "bounded errors", "paper, section 4, bound on the errors"
+    EXCITING_TREE = "exciting tree", "paper, theorem 2"
+    PERSISTENT_EXCITATION = "persistent excitation", "audit, section 3 (ii)"
+    BETA_BELOW_PRINTED = "beta below the printed rate", "paper, theorem 2"
+    BETA_BELOW_VALID = "beta below the valid rate", "audit, sections 5 and 6"
+    BETA_BELOW_IMPROVED = "beta below the improved rate", "audit, sections 5 and 6"
+    BETA_BELOW_FLOQUET = "beta below the Floquet rate", "audit, sections 5 and 6"
+
+    def __new__(cls, words: str, source: str) -> Hypothesis:
+        """A member whose value is its words."""
+        member = str.__new__(cls, words)
+        member._value_ = words
+        member.source = source
+        return member
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class CheckedHypothesis:
     """One hypothesis on one scenario.
 
     Parameters
     ----------
-    name : str
-        Short name, by which bounds refer to it.
+    name : Hypothesis
+        Which one.
     holds : bool
         Whether it holds.
     detail : str
@@ -42,13 +61,23 @@ class Hypothesis:
         Where it is stated.
     """
 
-    name: str
+    name: Hypothesis
     holds: bool
     detail: str
     source: str
 
+    @property
+    def failure(self) -> str:
+        """The sentence on a hypothesis that does not hold."""
+        return f"Hypothesis '{self.name}' fails: {self.detail}"
 
-def network_hypotheses(scenario: Scenario, cycle: float) -> list[Hypothesis]:
+
+def follows_paper(scenario: Scenario) -> bool:
+    """Whether trigger and channel are those that the paper's theorems are about."""
+    return scenario.trigger.kind in _PAPER_LAWS and scenario.channel.ideal
+
+
+def network_hypotheses(scenario: Scenario, cycle: float) -> list[CheckedHypothesis]:
     """Hypotheses on graph, weights, channel and trigger that need no constants.
 
     Parameters
@@ -58,55 +87,50 @@ def network_hypotheses(scenario: Scenario, cycle: float) -> list[Hypothesis]:
     cycle : float
         Length [s] of the interval from t = 0 over which the union of the graphs is taken.
     """
-    parts = connected_components(scenario, cycle)
-    period, kind = scenario.edge_weights.period, scenario.trigger.kind
-    is_bounded = envelope(scenario) is not None or (kind is TriggerKind.SAMPLED and scenario.channel.ideal)
-    joined = "joins all agents" if len(parts) == 1 else f"falls into the parts {_listing(parts)} of the agents"
+    components = connected_components(scenario, cycle)
+    period, kind, ideal = scenario.edge_weights.period, scenario.trigger.kind, scenario.channel.ideal
+    is_papers = kind in _PAPER_LAWS
+    is_bounded = error_envelope(scenario) is not None or (kind is TriggerKind.SAMPLED and ideal)
+    joined = "joins all agents" if len(components) == 1 else f"falls into the parts {listed(components)} of the agents"
     return [
-        Hypothesis(
-            "connected union",
-            len(parts) == 1,
+        _check(
+            Hypothesis.CONNECTED_UNION,
+            len(components) == 1,
             f"The union of the graphs over {cycle:.6g} s {joined}.{_weak_edges(scenario, cycle)}",
-            "paper, theorem 2 and corollary 1",
         ),
-        Hypothesis(
-            "periodic weights",
+        _check(
+            Hypothesis.PERIODIC_WEIGHTS,
             period is not None,
             "The weights are constant."
             if period == 0
             else f"The weights have the period {period:.6g} s."
             if period is not None
             else f"The weights have no period; constants hold for the run up to {scenario.stop_time:.6g} s only.",
-            "audit, section 7",
         ),
-        Hypothesis(
-            "trigger of the paper",
-            kind in PAPER_LAWS,
-            f"The trigger is '{kind.value}'."
-            if kind in PAPER_LAWS
-            else f"The trigger is '{kind.value}'; the paper's theorems are about the static and the dynamic one.",
-            "paper, section 4",
+        _check(
+            Hypothesis.PAPER_TRIGGER,
+            is_papers,
+            f"The trigger is '{kind.value}'"
+            + ("." if is_papers else "; the paper's theorems are about the static and the dynamic one."),
         ),
-        Hypothesis(
-            "ideal channel",
-            scenario.channel.ideal,
+        _check(
+            Hypothesis.IDEAL_CHANNEL,
+            ideal,
             "Broadcasts arrive at once."
-            if scenario.channel.ideal
+            if ideal
             else "Broadcasts are delayed or lost, so neighbours hold different copies and the average can drift.",
-            "paper, section 4",
         ),
-        Hypothesis(
-            "bounded errors",
+        _check(
+            Hypothesis.BOUNDED_ERRORS,
             is_bounded,
             "The trigger keeps every error below a function of time that is known in advance."
             if is_bounded
             else "No bound on the errors is known in advance.",
-            "paper, section 4, bound on the errors",
         ),
     ]
 
 
-def bound_hypotheses(bounds: Bounds) -> list[Hypothesis]:
+def bound_hypotheses(bounds: Bounds) -> list[CheckedHypothesis]:
     """Excitation of the tree and of the whole network, bounded errors, and how beta compares with each rate.
 
     Parameters
@@ -116,40 +140,40 @@ def bound_hypotheses(bounds: Bounds) -> list[Hypothesis]:
     """
     analysis = bounds.analysis
     constants, decay = analysis.tree_weights, analysis.scenario.trigger.decay
-    rates = {"printed": bounds.printed.rate, "valid": bounds.valid.rate, "improved": bounds.improved_rate}
-    if bounds.floquet_rate is not None:
-        rates["Floquet"] = bounds.floquet_rate
     excited, all_excited = bounds.printed.rate > 0, bounds.improved_rate > 0
     found = [
-        Hypothesis(
-            "exciting tree",
+        _check(
+            Hypothesis.EXCITING_TREE,
             excited,
             f"The weights of the tree with the edges {list(analysis.tree.tree)} have mu1 = {constants.mu1:.6g}, "
             f"mu2 = {constants.mu2:.6g} over every window of T = {constants.window:.6g} s"
-            + ("." if excited else f": {_idle_tree_edges(analysis)}"),
-            "paper, theorem 2",
+            + ("." if excited else f": {idle_tree_edges(analysis)}"),
         ),
-        Hypothesis(
-            "persistent excitation",
+        _check(
+            Hypothesis.PERSISTENT_EXCITATION,
             all_excited,
             f"The matrix N has mu1 = {analysis.disagreement.mu1:.6g} over every window of T = {analysis.window:.6g} s"
-            + ("." if all_excited else f": {_idle_window(analysis)}"),
-            "audit, section 3 (ii)",
+            + ("." if all_excited else f": {idle_window(analysis)}"),
         ),
     ]
     reason = _unbounded(bounds)
     if reason is not None:
-        found.append(Hypothesis("bounded errors", False, reason, "audit, section 11.7"))
-    for form, rate in rates.items():
-        found.append(
-            Hypothesis(
-                f"beta below the {form} rate",
-                decay < rate,
-                f"beta is {decay:.6g}/s, the {form} rate {rate:.6g}/s.",
-                "paper, theorem 2" if form == "printed" else "audit, sections 5 and 6",
-            )
-        )
-    return found
+        found.append(CheckedHypothesis(Hypothesis.BOUNDED_ERRORS, False, reason, "audit, section 11.7"))
+    rates = {
+        Hypothesis.BETA_BELOW_PRINTED: ("printed", bounds.printed.rate),
+        Hypothesis.BETA_BELOW_VALID: ("valid", bounds.valid.rate),
+        Hypothesis.BETA_BELOW_IMPROVED: ("improved", bounds.improved_rate),
+        Hypothesis.BETA_BELOW_FLOQUET: ("Floquet", bounds.floquet_rate),
+    }
+    return found + [
+        _check(hypothesis, decay < rate, f"beta is {decay:.6g}/s, the {form} rate {rate:.6g}/s.")
+        for hypothesis, (form, rate) in rates.items()
+        if rate is not None
+    ]
+
+
+def _check(hypothesis: Hypothesis, holds: bool, detail: str) -> CheckedHypothesis:
+    return CheckedHypothesis(hypothesis, holds, detail, hypothesis.source)
 
 
 def _weak_edges(scenario: Scenario, cycle: float) -> str:
@@ -170,7 +194,7 @@ def _unbounded(bounds: Bounds) -> str | None:
     """Why sampled checks keep the errors below no known bound; None if they do, or if the trigger is another."""
     scenario = bounds.analysis.scenario
     trigger = scenario.trigger
-    if trigger.kind is not TriggerKind.SAMPLED or not scenario.channel.ideal or bounds.parts is not None:
+    if trigger.kind is not TriggerKind.SAMPLED or not scenario.channel.ideal or bounds.envelope is not None:
         return None
     slope = bounds.sampled_slope
     if slope is None:
@@ -182,58 +206,3 @@ def _unbounded(bounds: Bounds) -> str | None:
         f"With checks every {trigger.period:.6g} s an error can outgrow what the checks allow: the fixed point c' of "
         f"the largest error grows with the factor {slope:.6g}, which must be below 1; check more often."
     )
-
-
-def _idle_tree_edges(analysis: Analysis) -> str:
-    """Which edge of the tree carries no weight in which window."""
-    failing, listed = "in some window an edge of the tree carries no weight:", len(analysis.scenario.network.edges)
-    unlisted = [number for number in analysis.tree.tree if number > listed]
-    if unlisted:
-        return f"{failing} edge {unlisted[0]} never does, it is one of the underlying graph alone."
-    starts, doses = _window_doses(analysis)
-    tree = np.array(analysis.tree.tree) - 1
-    place = int(np.argmin(doses[:, tree].min(axis=1)))
-    least = doses[place, tree]
-    idle = tree[least <= max(float(least.min()), _ZERO * float(doses.max()))]
-    names = ", ".join(str(edge + 1) for edge in idle.tolist())
-    return f"{failing} edge {names} {_span(starts[place], analysis.window)}."
-
-
-def _idle_window(analysis: Analysis) -> str:
-    """A window in which the edges that carry weight do not join all agents."""
-    network = analysis.scenario.network
-    starts, doses = _window_doses(analysis)
-    factor = disagreement_basis(network.agents).T @ incidence(network.agents, network.edges)
-    least = np.linalg.eigvalsh((factor * doses[:, None, :]) @ factor.T)[:, 0]
-    place = int(np.argmin(least))
-    active = np.flatnonzero(doses[place] > _ZERO * float(doses.max()))
-    span = f"in the window {_span(starts[place], analysis.window)}"
-    if not active.size:
-        return f"{span} no edge carries weight."
-    graph: nx.Graph[int] = nx.Graph()
-    graph.add_nodes_from(range(1, network.agents + 1))
-    graph.add_edges_from(network.edges[edge] for edge in active)
-    parts = sorted(sorted(part) for part in nx.connected_components(graph))
-    edges = ", ".join(str(edge + 1) for edge in active)
-    return f"{span} only the edges {edges} carry weight, and they join the agents to {_listing(parts)}."
-
-
-def _window_doses(analysis: Analysis) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Starts of windows [s], and the integral of each listed edge's weight over them, shape (starts, m)."""
-    weights, length = analysis.scenario.edge_weights, analysis.window
-    last = analysis.cycle if analysis.is_periodic else max(analysis.cycle - length, 0.0)
-    corners = np.concatenate(
-        ([0.0, last], weights.breakpoints(0.0, last), weights.breakpoints(length, last + length) - length)
-    )
-    corners = np.unique(np.clip(corners, 0.0, last))
-    share = np.arange(_BETWEEN) / _BETWEEN
-    starts = np.append((corners[:-1, None] + np.diff(corners)[:, None] * share).ravel(), last)
-    return starts, weights.integral(starts, starts + length)
-
-
-def _span(start: float, length: float) -> str:
-    return f"from t = {start:.6g} s to {start + length:.6g} s"
-
-
-def _listing(parts: list[list[int]]) -> str:
-    return " and ".join("{" + ", ".join(map(str, part)) + "}" for part in parts)

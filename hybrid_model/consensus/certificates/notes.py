@@ -9,10 +9,12 @@ import numpy as np
 
 from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.certificates.bounds import Bounds, with_threshold
-from hybrid_model.consensus.certificates.hypotheses import PAPER_LAWS, Hypothesis
+from hybrid_model.consensus.certificates.forms import BOUNDS, Evidence, Quantity
+from hybrid_model.consensus.certificates.gaps import Gaps
+from hybrid_model.consensus.certificates.hypotheses import CheckedHypothesis, Hypothesis, follows_paper
 from hybrid_model.consensus.certificates.observation import Observation
 from hybrid_model.consensus.certificates.rates import corollary_rate, corollary_rate_exact
-from hybrid_model.consensus.certificates.tree_bound import tree_radii
+from hybrid_model.consensus.certificates.tree_bound import ConvergenceBound, tree_radii
 from hybrid_model.consensus.certificates.verdicts import statement
 from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.runs.report import edge_norm
@@ -24,11 +26,11 @@ __all__ = ["scenario_notes"]
 _NEGLIGIBLE = 0.01
 
 
-def scenario_notes(bounds: Bounds, hypotheses: Sequence[Hypothesis], seen: Observation | None) -> Iterator[str]:
+def scenario_notes(bounds: Bounds, hypotheses: Sequence[CheckedHypothesis], seen: Observation | None) -> Iterator[str]:
     """All notes on a scenario whose union of graphs is connected."""
-    for hypothesis in hypotheses:
-        if not hypothesis.holds:
-            yield f"Hypothesis '{hypothesis.name}' fails: {hypothesis.detail} {_remains(hypothesis, bounds)}".strip()
+    for checked in hypotheses:
+        if not checked.holds:
+            yield f"{checked.failure} {_remains(checked.name, bounds)}".strip()
     yield from _constants(bounds.analysis)
     yield from _accuracy(bounds)
     yield from _corollary(bounds.analysis)
@@ -47,48 +49,53 @@ def scenario_notes(bounds: Bounds, hypotheses: Sequence[Hypothesis], seen: Obser
             )
 
 
-def _remains(hypothesis: Hypothesis, bounds: Bounds) -> str:
+def _remains(failed: Hypothesis, bounds: Bounds) -> str:
     """What is still true when a hypothesis fails."""
-    analysis, name = bounds.analysis, hypothesis.name
-    end = analysis.scenario.stop_time
-    if name == "trigger of the paper" and analysis.scenario.trigger.kind is TriggerKind.CONTINUOUS:
-        return "It has no events, so there is no gap to bound."
-    if name == "exciting tree":
-        return "The tree-free, energy and exact forms need no tree."
-    scenario = analysis.scenario
-    if name.startswith("beta below") and not (scenario.channel.ideal and scenario.trigger.kind in PAPER_LAWS):
-        # What follows is about a threshold c exp(-beta t) on broadcasts that arrive at once.
-        return ""
-    if name == "beta below the printed rate":
-        return "The printed bound does not exist; the exact form needs no beta below alpha_v."
-    if name == "beta below the valid rate":
-        bound = bounds.valid
-        if bound.kappa1 is None or bound.kappa2 is None:
-            return ""
-        factor, kappa1, kappa2 = bound.rho, bound.rho * bound.kappa1, bound.rho * bound.kappa2
-        if bound.decay == bound.rate:
-            shape = f"({factor * bound.transient:.6g} + {kappa2:.6g} (1 + t/{bound.window:.6g}))"
-        else:
-            shape = f"{kappa1:.6g}"
-        return f"No valid factor of exp(-beta t) exists; still ||x_e(t)|| <= {shape} exp(-{bound.rate:.6g} t)."
-    if name == "beta below the Floquet rate":
-        gap = bounds.gap_until(end)
-        still = "" if gap is None else f"; no two broadcasts of an agent up to {end:.6g} s are closer than {gap:.6g} s"
-        return (
-            "The threshold falls faster than disagreement can, so gaps shrink without a uniform bound. Consensus is "
-            f"still reached, at the Floquet rate, and no Zeno behaviour occurs{still}."
-        )
-    if name == "periodic weights":
-        return "There is no Floquet rate; the exact radius is that of the run up to the stop time."
-    if name == "beta below the improved rate" and analysis.is_periodic:
-        return "The improved radius does not exist; the energy bound and the exact form go by the Floquet rate."
-    if name == "beta below the improved rate":
-        return "The energy bound does not exist; the exact radius and the gap hold for the run up to the stop time."
-    if name == "bounded errors":
-        timed = scenario.trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC)
-        also = " and the period, as a gap," if timed else ""
-        return f"Only the rate of the network without errors{also} {'are' if timed else 'is'} certified."
+    scenario, is_periodic = bounds.analysis.scenario, bounds.analysis.is_periodic
+    # What follows from rates above beta is about a threshold c exp(-beta t) on broadcasts that arrive at once.
+    is_papers = follows_paper(scenario)
+    match failed:
+        case Hypothesis.PAPER_TRIGGER if scenario.trigger.kind is TriggerKind.CONTINUOUS:
+            return "It has no events, so there is no gap to bound."
+        case Hypothesis.EXCITING_TREE:
+            return "The tree-free, energy and exact forms need no tree."
+        case Hypothesis.PERIODIC_WEIGHTS:
+            return "There is no Floquet rate; the exact radius is that of the run up to the stop time."
+        case Hypothesis.BOUNDED_ERRORS if scenario.trigger.kind in (TriggerKind.SAMPLED, TriggerKind.PERIODIC):
+            return "Only the rate of the network without errors and the period, as a gap, are certified."
+        case Hypothesis.BOUNDED_ERRORS:
+            return "Only the rate of the network without errors is certified."
+        case Hypothesis.BETA_BELOW_PRINTED if is_papers:
+            return "The printed bound does not exist; the exact form needs no beta below alpha_v."
+        case Hypothesis.BETA_BELOW_VALID if is_papers:
+            return _without_valid_factor(bounds.valid)
+        case Hypothesis.BETA_BELOW_IMPROVED if is_papers and is_periodic:
+            return "The improved radius does not exist; the energy bound and the exact form go by the Floquet rate."
+        case Hypothesis.BETA_BELOW_IMPROVED if is_papers:
+            return "The energy bound does not exist; the exact radius and the gap hold for the run up to the stop time."
+        case Hypothesis.BETA_BELOW_FLOQUET if is_papers:
+            return _without_uniform_gap(bounds, scenario.stop_time)
     return ""
+
+
+def _without_valid_factor(bound: ConvergenceBound) -> str:
+    if bound.kappa1 is None or bound.kappa2 is None:
+        return ""
+    rho, kappa1, kappa2 = bound.rho, bound.rho * bound.kappa1, bound.rho * bound.kappa2
+    if bound.decay == bound.rate:
+        shape = f"({rho * bound.transient:.6g} + {kappa2:.6g} (1 + t/{bound.window:.6g}))"
+    else:
+        shape = f"{kappa1:.6g}"
+    return f"No valid factor of exp(-beta t) exists; still ||x_e(t)|| <= {shape} exp(-{bound.rate:.6g} t)."
+
+
+def _without_uniform_gap(bounds: Bounds, end: float) -> str:
+    gap = Gaps(bounds).until(end)
+    still = "" if gap is None else f"; no two broadcasts of an agent up to {end:.6g} s are closer than {gap:.6g} s"
+    return (
+        "The threshold falls faster than disagreement can, so gaps shrink without a uniform bound. Consensus is "
+        f"still reached, at the Floquet rate, and no Zeno behaviour occurs{still}."
+    )
 
 
 def _constants(analysis: Analysis) -> Iterator[str]:
@@ -160,7 +167,7 @@ def _corollary(analysis: Analysis) -> Iterator[str]:
 
 def _radius_notes(bounds: Bounds) -> Iterator[str]:
     scenario = bounds.analysis.scenario
-    found = tree_radii(scenario, bounds.analysis.window) if bounds.parts and scenario.trigger.threshold > 0 else []
+    found = tree_radii(scenario, bounds.analysis.window) if bounds.envelope and scenario.trigger.threshold > 0 else []
     if len(found) > 1:
         least, most = min(found, key=lambda t: t.kappa2), max(found, key=lambda t: t.kappa2)
         best = min(found, key=lambda t: t.radius)
@@ -169,15 +176,10 @@ def _radius_notes(bounds: Bounds) -> Iterator[str]:
             f"{list(least.tree)}), kappa_2^M = {most.kappa2:.6g} (tree {list(most.tree)}); every tree bounds the same "
             f"x_e, so the least rho kappa_2 = {best.radius:.6g} (tree {list(best.tree)}) is a bound."
         )
-    if bounds.parts and all(decay > 0 for _, decay in bounds.parts):
+    if bounds.envelope and all(decay > 0 for _, decay in bounds.envelope):
         held = with_threshold(scenario, scenario.trigger.threshold, 0.0)
-        constant = Bounds(bounds.analysis.alike(held))
-        numbers = {
-            "printed": constant.printed_radius,
-            "valid": constant.valid_radius,
-            "energy": constant.energy_radius,
-            "exact": constant.exact_radius,
-        }
+        constant = Evidence(Bounds(bounds.analysis.alike(held)))
+        numbers = {row.form: row.value(constant) for row in BOUNDS if row.quantity is Quantity.RADIUS and row.in_json}
         listing = ", ".join(f"{form} {value:.6g}" for form, value in numbers.items() if value is not None)
         yield (
             "The threshold decays, so x_e goes to 0 and the radii are factors of exp(-beta t). "
@@ -196,12 +198,12 @@ def _refuted(bounds: Bounds, seen: Observation | None) -> Iterator[str]:
     if bounds.floquet_rate is not None and printed.rate > bounds.floquet_rate * (1 + 1e-9):
         yield f"The printed rate {printed.rate:.6g}/s is false here: the Floquet rate is {bounds.floquet_rate:.6g}/s."
     scenario = bounds.analysis.scenario
-    if scenario.trigger.kind not in PAPER_LAWS or not scenario.channel.ideal:
+    if not follows_paper(scenario):
         return
-    gap = bounds.printed_gap
+    gaps = Gaps(bounds)
+    gap = gaps.printed
     if gap is not None and printed.kappa1 is not None and printed.kappa1 < 0:
-        trigger = bounds.analysis.scenario.trigger
-        limit = trigger.threshold / (bounds.printed_speed * (printed.kappa2 or 1.0))
+        limit = scenario.trigger.threshold / (gaps.printed_speed * (printed.kappa2 or 1.0))
         yield (
             f"The printed minimum gap {gap:.6g} s is not one: kappa_1 = {printed.kappa1:.6g} is negative, so its "
             f"formula is not the least value of its own inequality, which tends to {limit:.6g} s; "

@@ -28,6 +28,7 @@ __all__ = [
     "excitation_horizon",
     "scenario_excitation",
     "signal_factor",
+    "window_corners",
     "window_extremes",
 ]
 
@@ -219,10 +220,7 @@ def _window_starts(weights: EdgeWeights, last: float, length: float) -> NDArray[
     """Starts to try from 0 to `last`, ascending: a grid with all points where a window's end meets a breakpoint."""
     if last <= 0:
         return np.zeros(1)
-    corners = np.concatenate(
-        ([0.0, last], weights.breakpoints(0.0, last), weights.breakpoints(length, length + last) - length)
-    )
-    corners = np.unique(corners)
+    corners = window_corners(weights, last, length)
     if _is_level(weights):
         return corners
     # A cell holds half an oscillation of the fastest carrier at most, and eight steps at least.
@@ -230,6 +228,14 @@ def _window_starts(weights: EdgeWeights, last: float, length: float) -> NDArray[
     counts = np.maximum(np.ceil(np.diff(corners) * fastest / np.pi), 1.0).astype(int) * _POINTS_PER_PIECE
     inner = [np.linspace(a, b, count + 1)[:-1] for (a, b), count in zip(pairwise(corners), counts, strict=True)]
     return np.append(np.concatenate(inner), last)
+
+
+def window_corners(weights: EdgeWeights, last: float, length: float) -> NDArray[np.float64]:
+    """Starts from 0 to `last` [s] at which an end of a window of that length meets a breakpoint, and both ends."""
+    corners = np.concatenate(
+        ([0.0, last], weights.breakpoints(0.0, last), weights.breakpoints(length, last + length) - length)
+    )
+    return np.unique(np.clip(corners, 0.0, last))
 
 
 def _is_level(weights: EdgeWeights) -> bool:

@@ -100,7 +100,7 @@ class TestBetaCloseToTheRate:
     def test_the_energy_bound_is_of_the_order_of_the_exact_radius(self, analysis):
         """The windows one by one: without them this bound is 6.7e305 at beta = 0.45."""
         bounds = Bounds(analysis)
-        exact, energy = 0.5 * bounds.exact_part(0.45), 0.5 * energy_radius(analysis, 0.45)
+        exact, energy = 0.5 * bounds.unit_exact_radius(0.45), 0.5 * energy_radius(analysis, 0.45)
         assert exact <= energy <= 12 * exact
         assert exact == pytest.approx(92.36, rel=1e-2)  # a grid of 0.1
 

@@ -16,6 +16,7 @@ from oracles.smooth_runs import smooth_run
 
 from hybrid_model.consensus.certificates.analysis import Analysis, analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.gaps import Gaps
 from hybrid_model.consensus.exact.transition_grid import transition_grid
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.scenario.files import read_scenario
@@ -64,7 +65,7 @@ def check_network(seed, most_agents, runs, seen, **kinds):
     # What the runs have in common is computed once, and then known to all that are alike.
     common = Bounds(analysis)
     rate = common.floquet_rate or 0.3
-    analysis.worst(0.0), analysis.worst(share * rate), common.energy_radius, common.improved_gap, common.printed
+    analysis.worst(0.0), analysis.worst(share * rate), common.energy_radius, Gaps(common).improved, common.printed
     for number in range(runs):
         check_run(random, analysis, KINDS[number % len(KINDS)], share, seen)
 
@@ -171,9 +172,9 @@ def check_states(bounds, times, states, free):
     D = incidence(network.agents, network.underlying_edges)
     tolerance = FLOW * float(np.ptp(network.initial))
     forced = states - mean - free
-    parts = bounds.parts
-    if parts and all(bounds.exact_part(decay) is not None for _, decay in parts):
-        worst = [(c * np.exp(-decay * times), analysis.worst(decay)) for c, decay in parts]
+    terms = bounds.envelope
+    if terms and all(bounds.unit_exact_radius(decay) is not None for _, decay in terms):
+        worst = [(c * np.exp(-decay * times), analysis.worst(decay)) for c, decay in terms]
         allowed = sum(level * case.radius for level, case in worst)
         assert np.all(np.linalg.norm(forced @ D, axis=1) <= allowed * (1 + ROUNDING) + tolerance)
         for i, j in network.edges:
@@ -187,15 +188,16 @@ def check_states(bounds, times, states, free):
 
 def check_gaps(bounds, events, seen):
     # The interval from the broadcast at the start to the first event counts as a gap, too.
-    gaps = [float(np.min(np.diff(times, prepend=0.0))) for times in events if len(times)]
-    observed = min(gaps, default=np.inf) * (1 + TIMES) + 1e-12
-    valid, improved = bounds.valid_gap, bounds.improved_gap
+    between = [float(np.min(np.diff(times, prepend=0.0))) for times in events if len(times)]
+    observed = min(between, default=np.inf) * (1 + TIMES) + 1e-12
+    gaps = Gaps(bounds)
+    valid, improved = gaps.valid, gaps.improved
     assert improved is None or improved <= observed
     assert valid is None or improved is None or valid <= improved * (1 + ROUNDING)
     if improved is None and bounds.analysis.scenario.trigger.kind is not TriggerKind.SAMPLED:
-        until = bounds.gap_until(bounds.analysis.scenario.stop_time)
+        until = gaps.until(bounds.analysis.scenario.stop_time)
         assert until is None or until <= observed
-    printed = bounds.printed_gap
+    printed = gaps.printed
     seen.printed_gap += printed is not None and printed > observed
 
 
@@ -224,10 +226,10 @@ def test_two_agents_violate_the_printed_gap():
                 "trigger": {"kind": "static", "threshold": c},
             }
         )
-        bounds = Bounds(analyse(scenario, window=0.05 / weight))
+        gaps = Gaps(Bounds(analyse(scenario, window=0.05 / weight)))
         observed = exact_run(scenario).min_gap
-        assert bounds.valid_gap <= bounds.improved_gap <= observed
-        failed += bounds.printed_gap > observed
+        assert gaps.valid <= gaps.improved <= observed
+        failed += gaps.printed > observed
     assert failed > 10
 
 

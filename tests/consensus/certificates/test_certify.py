@@ -14,6 +14,7 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.certify import certify
+from hybrid_model.consensus.certificates.gaps import Gaps
 from hybrid_model.consensus.certificates.rates import corollary_rate, corollary_rate_exact
 from hybrid_model.consensus.certificates.tree_bound import BoundForm, tree_radii
 from hybrid_model.consensus.certificates.verdicts import Verdict, statement
@@ -326,7 +327,7 @@ class TestHypothesesThatFail:
         assert found.value("rate", "floquet") == pytest.approx(3.0)
         note = next(n for n in found.notes if "'beta below the Floquet rate'" in n)
         assert "Consensus is still reached" in note
-        least = Bounds(analyse(scenario)).gap_until(scenario.stop_time)
+        least = Gaps(Bounds(analyse(scenario))).until(scenario.stop_time)
         assert f"closer than {least:.6g} s" in note
         assert least <= found.value("min_gap", "observed")
 

@@ -11,6 +11,7 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates import counterexamples
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.gaps import Gaps
 from hybrid_model.consensus.certificates.rates import corollary_rate
 from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
 from hybrid_model.consensus.certificates.verdicts import STATEMENTS, Verdict
@@ -54,7 +55,7 @@ def numbers(example, cases):
     best = printed.disturbance / -math.expm1(-printed.rate * printed.window)
     corollary = joint_excitation(analysis.scenario)
     literal_window = convergence_bound(analysis.scenario, BoundForm.PRINTED, analysis.tree, 3 * math.pi)
-    late = analysis.scenario.trigger.threshold / (static.printed_speed * printed.kappa2)
+    late = analysis.scenario.trigger.threshold / (Gaps(static).printed_speed * printed.kappa2)
     return {
         "rate by theorem 1, integral of W W'": literal.printed,
         "true rate": literal.actual,
@@ -88,10 +89,10 @@ def numbers(example, cases):
         "minimum gap printed, two agents": gap.printed,
         "gap observed, two agents": gap.actual,
         "minimum gap with kappa_2 alone, two agents": counterexamples.corrected_gap_without_kappa1(),
-        "minimum gap printed, example, beta = 0": static.printed_gap,
+        "minimum gap printed, example, beta = 0": Gaps(static).printed,
         "its limit for late events, example, beta = 0": late,
-        "minimum gap improved, example, beta = 0": static.improved_gap,
-        "minimum gap improved, example, beta = 0.06": dynamic.improved_gap,
+        "minimum gap improved, example, beta = 0": Gaps(static).improved,
+        "minimum gap improved, example, beta = 0.06": Gaps(dynamic).improved,
         "gap observed, example, beta = 0": static_run.min_gap,
         "gap observed, example, beta = 0.06": dynamic_run.min_gap,
         "rho, example": printed.rho,
