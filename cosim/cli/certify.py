@@ -12,7 +12,7 @@ import hybrid_model as hm
 from cosim.cli.exits import Exit, UsageError, exit_of, progress
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.forms import Certified, Quantity
-from hybrid_model.consensus.figures.certificates import save_certificate_figures
+from hybrid_model.consensus.figures.conservatism import save_certificate_figures
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.native.compiled import compiled

@@ -15,7 +15,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
-from hybrid_model.consensus.figures.run import COLUMN, MARKER, plot_broadcasts, plot_error_against_threshold
+from hybrid_model.consensus.figures.run import plot_broadcasts, plot_error_against_threshold
+from hybrid_model.consensus.figures.style import COLUMN, DASHES, MARKER, VIOLATED, legend_above, over_time
 from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of
 from hybrid_model.consensus.runs.metrics import States, disagreement, gap_statistics
 from hybrid_model.consensus.scenario.definition import Scenario
@@ -30,8 +31,6 @@ __all__ = [
     "plot_gaps_against_bounds",
 ]
 
-DASHES = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), "solid", (0, (3, 1, 1, 1, 1, 1)))
-"""Line styles of bounds, so that they can be told apart without colour as well."""
 SHADE = "#d9d9d9"
 
 
@@ -152,14 +151,12 @@ def plot_gaps_against_bounds(
             continue
         violated = smallest is not None and smallest < bound
         label = f"{name} bound" + (", violated" if violated else "")
-        ax.axhline(bound, color="#d55e00" if violated else "0.25", linestyle=style, linewidth=0.9, label=label)
+        ax.axhline(bound, color=VIOLATED if violated else "0.25", linestyle=style, linewidth=0.9, label=label)
         lowest = min(lowest, bound)
     top = ax.get_ylim()[1]
     ax.set_ylim(lowest / 2, max([top, *(2 * b for b in bounds.values() if b is not None and b < math.inf)]))
-    ax.set_xlim(0.0, scenario.stop_time)
-    ax.spines["left"].set_position(("outward", 4.0))
-    ax.set_xlabel("time $t$ (s)")
-    _side_legend(ax)
+    over_time(ax, scenario)
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, handlelength=1.8)
     return ax
 
 
@@ -195,7 +192,7 @@ def plot_gap_histogram(
     ax.set_xlabel("time between broadcasts of an agent (s)")
     ax.set_ylabel("number")
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.3)
+    legend_above(ax)
     return ax
 
 
@@ -223,19 +220,11 @@ def plot_disagreement(
     if level is not None:
         ax.axhline(level, color="0.5", linewidth=0.7, zorder=0, label="settled")
     ax.set_yscale("log")
-    ax.set_xlim(0.0, scenario.stop_time)
-    ax.set_xlabel("time $t$ (s)")
+    over_time(ax, scenario)
     ax.set_ylabel(r"disagreement $\|x - \bar{x}\mathbf{1}\|$")
-    handles = len(ax.get_legend_handles_labels()[0])
-    ax.legend(
-        loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.3, ncols=2 if handles > 2 else 1, handlelength=1.8
-    )
+    legend_above(ax, handlelength=1.8)
     return ax
 
 
 def _cycled(count: int) -> list[Any]:
     return [DASHES[k % len(DASHES)] for k in range(count)]
-
-
-def _side_legend(ax: Axes) -> None:
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, handlelength=1.8)

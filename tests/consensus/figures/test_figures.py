@@ -13,13 +13,13 @@ import pytest
 import hybrid_model as hm
 from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
 from hybrid_model.consensus.figures.run import (
-    COLUMN,
     plot_broadcasts,
     plot_edge_norm,
     plot_error_against_threshold,
     plot_states,
     save_paper_figures,
 )
+from hybrid_model.consensus.figures.style import COLUMN
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.definition import replace_trigger

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
+from hybrid_model.consensus.certificates.forms import Quantity
+from hybrid_model.consensus.figures.conservatism import plot_conservatism
 from hybrid_model.consensus.figures.details import (
     plot_all_errors,
     plot_broadcasts_and_weights,
@@ -18,13 +20,9 @@ from hybrid_model.consensus.figures.details import (
     plot_gap_histogram,
     plot_gaps_against_bounds,
 )
-from hybrid_model.consensus.figures.run import COLUMN, plot_error_against_threshold
-from hybrid_model.consensus.figures.sweeps import (
-    plot_against_parameter,
-    plot_conservatism,
-    plot_radius_against,
-    plot_rate_against,
-)
+from hybrid_model.consensus.figures.run import plot_error_against_threshold
+from hybrid_model.consensus.figures.style import COLUMN
+from hybrid_model.consensus.figures.sweeps import plot_against_parameter, plot_radius_against, plot_rate_against
 from hybrid_model.consensus.laws.closed_loop import closed_loop, edges_of
 from hybrid_model.consensus.runs.metrics import run_states
 from hybrid_model.consensus.runs.periodic_run import periodic_run
@@ -152,7 +150,7 @@ def test_rate_against_c_has_no_such_line(ax):
 
 def test_wrong_number_of_values(ax):
     with pytest.raises(ValueError, match="'valid' has 1 values for 2 of the parameter"):
-        plot_against_parameter([1.0, 2.0], {"valid": [1.0]}, xlabel="c", ylabel="rate", ax=ax)
+        plot_against_parameter([1.0, 2.0], {"valid": [1.0]}, name="c", quantity=Quantity.RATE, ax=ax)
 
 
 def test_conservatism_is_a_factor_and_violations_are_named(ax):
