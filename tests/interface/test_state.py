@@ -252,7 +252,7 @@ class Wheels(hm.HybridAutomaton):
 @pytest.mark.parametrize("obey", [True, False])
 def test_the_look_ahead_of_a_large_model_stops_where_it_costs_too_much(obey, exported):
     """What it announces then is no event, and those that come are found all the same."""
-    small, large = Wheels(wheels=2), Wheels(wheels=400)
+    small, large = Wheels(wheels=2), Wheels(wheels=60)
     found = {}
     for name, automaton in (("small", small), ("large", large)):
         component = instance(Binary(exported(automaton, f"wheels_{name}")), "3.0 CS")

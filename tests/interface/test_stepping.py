@@ -233,9 +233,9 @@ def test_experiments_that_cannot_be_are_refused(label, start, stop, tolerance, w
 
 
 def extremes():
-    """With rates of 1e300 a step takes all that the solver may: in the quick run in one setting of those."""
+    """With rates of 1e300 a step takes all that the solver may, seconds, unless it ends at the first event."""
     for label, push in itertools.product(STEPPING, [1e300, -1e300, 1e308, 5e-324, -0.0]):
-        slow = push == 1e300 and label in ("3.0 CS, events inside", "3.0 CS without events")
+        slow = push == 1e300 and label != "3.0 CS"
         yield pytest.param(label, push, marks=pytest.mark.long if slow else ())
 
 

@@ -78,7 +78,7 @@ class Exchange:
     def crossing(self, x, k1, target, before):
         """The first time at which an indicator is in another domain, to the last bit, and the state there."""
         early, late = self.t, target
-        while late - early > 2 * np.spacing(late):
+        while late - early > 2 * np.spacing(max(abs(early), abs(late))):
             middle = (early + late) / 2
             if ((self.indicators(middle, self.reach(x, k1, middle - self.t)) > 0) != before).any():
                 late = middle

@@ -20,10 +20,13 @@ def instance(binary, label, **options):
 
 
 class Journey:
-    """A component that has been initialised, on its way; for Model Exchange with an importer that integrates."""
+    """A component that has been initialised, on its way; for Model Exchange with an importer that integrates.
 
-    def __init__(self, component, t_start=0.0, t_stop=None, **start):
-        self.component = component
+    With `obey` no step goes beyond the next event time that the FMU has announced.
+    """
+
+    def __init__(self, component, t_start=0.0, t_stop=None, *, obey=False, **start):
+        self.component, self.obey = component, obey
         component.initialize(t_start, t_stop, **start)
         self.t, self.update, self.over = t_start, None, False
         if component.starts_in_event_mode:
@@ -65,14 +68,16 @@ class Journey:
         self.t, self.update, self.over = self.exchange.t, self.exchange.update, record.ended
 
     def _step(self, t):
-        target = self.t + (t - self.t)  # what the FMU can know of the target: differences of floats round
-        found = self.component.step(self.t, t - self.t)
+        announced = self.update.next_time if self.obey else None
+        end = t if announced is None else min(t, max(announced, self.t))
+        target = self.t + (end - self.t)  # what the FMU can know of the target: differences of floats round
+        found = self.component.step(self.t, end - self.t)
         assert found.status in (OK, DISCARD), self.component.log[-3:]
         assert self.t <= found.time <= target
         assert found.early or found.terminate or found.time == target
         # Only an event may stand at the very beginning of a step.
         assert found.time > self.t or found.event or found.terminate
-        self.t, self.over = found.time if found.time < target else t, found.terminate
-        if found.event and self.component.events:
+        self.t, self.over = found.time if found.time < target else end, found.terminate
+        if self.component.events and (found.event or self.t == announced):
             self.component.do("EnterEventMode")
             self.settle()
