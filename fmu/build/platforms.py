@@ -8,13 +8,12 @@ its library in both folders.
 
 from __future__ import annotations
 
-import platform
-import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from fmu.build.mach_o import universal
 from fmu.errors import BuildError
+from fmu.standard.platforms import EXTENSIONS, FMI2, this_machine
 
 
 @dataclass(frozen=True)
@@ -27,21 +26,25 @@ class Platform:
         As in FMI 3, for example ``x86_64-linux``.
     zig_target : str
         What the compiler of the package ziglang calls it, with the oldest system that libraries shall run on.
-    extension : str
-        Of a shared library.
-    fmi2_folder : str
-        The folder that FMI 2 had for this system before it knew of other processors than x86.
     """
 
     name: str
     zig_target: str
-    extension: str
-    fmi2_folder: str
 
     @property
     def system(self) -> str:
         """``linux``, ``windows`` or ``darwin``."""
         return self.name.partition("-")[2]
+
+    @property
+    def extension(self) -> str:
+        """Of a shared library."""
+        return EXTENSIONS[self.system]
+
+    @property
+    def fmi2_folder(self) -> str:
+        """The folder that FMI 2 had for this system before it knew of other processors than x86."""
+        return next(name for name, place in FMI2.items() if place == ("x86_64", self.system))
 
     @property
     def is_x86(self) -> bool:
@@ -53,19 +56,16 @@ PLATFORMS = {
     entry.name: entry
     for entry in (
         # glibc 2.17 is of 2012, and the first one for aarch64.
-        Platform("x86_64-linux", "x86_64-linux-gnu.2.17", ".so", "linux64"),
-        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", ".so", "linux64"),
-        Platform("x86_64-windows", "x86_64-windows-gnu", ".dll", "win64"),
-        Platform("aarch64-windows", "aarch64-windows-gnu", ".dll", "win64"),
-        Platform("x86_64-darwin", "x86_64-macos.10.15", ".dylib", "darwin64"),
+        Platform("x86_64-linux", "x86_64-linux-gnu.2.17"),
+        Platform("aarch64-linux", "aarch64-linux-gnu.2.17"),
+        Platform("x86_64-windows", "x86_64-windows-gnu"),
+        Platform("aarch64-windows", "aarch64-windows-gnu"),
+        Platform("x86_64-darwin", "x86_64-macos.10.15"),
         # The first macOS for this processor.
-        Platform("aarch64-darwin", "aarch64-macos.11.0", ".dylib", "darwin64"),
+        Platform("aarch64-darwin", "aarch64-macos.11.0"),
     )
 }
 """All platforms by name."""
-
-_SYSTEMS = {"linux": "linux", "win32": "windows", "cygwin": "windows", "darwin": "darwin"}
-_PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
 
 
 def this_platform() -> Platform:
@@ -76,8 +76,7 @@ def this_platform() -> Platform:
     BuildError
         If it is none of `PLATFORMS`.
     """
-    processor = _PROCESSORS.get(platform.machine().lower(), platform.machine())
-    name = f"{processor}-{_SYSTEMS.get(sys.platform, sys.platform)}"
+    name = "-".join(this_machine())
     if name not in PLATFORMS:
         raise BuildError(
             f"This machine is '{name}', and FMUs are built for {', '.join(PLATFORMS)} only. "

@@ -51,7 +51,7 @@ def parts_of(folder: str) -> tuple[str, str, str] | None:
 
 def this_machine() -> tuple[str, str]:
     """Return architecture and system of this Python process."""
-    systems = {"linux": "linux", "darwin": "darwin", "win32": "windows"}
+    systems = {"linux": "linux", "darwin": "darwin", "win32": "windows", "cygwin": "windows"}
     machine = platform.machine().lower()
     known = _MACHINES.get(machine, machine)
     if sys.maxsize < 2**32 and known == "x86_64":

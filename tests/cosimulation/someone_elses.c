@@ -136,24 +136,3 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
     *value = ((Block *)c)->ended;
     return kind == fmi2Terminated && ((Block *)c)->behaviour != SHRUGS ? fmi2OK : fmi2Discard;
 }
-
-/* What the standard wants to be there. */
-#define ABSENT(NAME, ...) fmi2Status fmi2##NAME(__VA_ARGS__) { return fmi2Error; }
-ABSENT(GetString, fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2String v[])
-ABSENT(SetString, fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2String v[])
-ABSENT(GetFMUstate, fmi2Component c, fmi2FMUstate *s)
-ABSENT(SetFMUstate, fmi2Component c, fmi2FMUstate s)
-ABSENT(FreeFMUstate, fmi2Component c, fmi2FMUstate *s)
-ABSENT(SerializedFMUstateSize, fmi2Component c, fmi2FMUstate s, size_t *n)
-ABSENT(SerializeFMUstate, fmi2Component c, fmi2FMUstate s, fmi2Byte b[], size_t n)
-ABSENT(DeSerializeFMUstate, fmi2Component c, const fmi2Byte b[], size_t n, fmi2FMUstate *s)
-ABSENT(GetDirectionalDerivative, fmi2Component c, const fmi2ValueReference a[], size_t n,
-       const fmi2ValueReference b[], size_t m, const fmi2Real d[], fmi2Real e[])
-ABSENT(SetRealInputDerivatives, fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer o[],
-       const fmi2Real v[])
-ABSENT(GetRealOutputDerivatives, fmi2Component c, const fmi2ValueReference r[], size_t n, const fmi2Integer o[],
-       fmi2Real v[])
-ABSENT(CancelStep, fmi2Component c)
-ABSENT(GetStatus, fmi2Component c, const fmi2StatusKind k, fmi2Status *v)
-ABSENT(GetIntegerStatus, fmi2Component c, const fmi2StatusKind k, fmi2Integer *v)
-ABSENT(GetStringStatus, fmi2Component c, const fmi2StatusKind k, fmi2String *v)
