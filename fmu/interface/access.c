@@ -14,8 +14,8 @@ static bool may_be_set(const Variable *variable, int mode)
     bool before_start = (mode & (MODE_INSTANTIATED | MODE_INITIALIZATION)) != 0;
     switch (variable->bank) {
     case BANK_INPUT: return mode != MODE_CONFIGURATION && (mode != MODE_INTERMEDIATE || !variable->discrete);
-    /* Tunable parameters change at events from outside (2.0.5 and 3.0.2, section 2.2.7 and 2.4.7): in Event Mode, and at
-       communication points of Co-Simulation, with or without event mode (3.0.2, section 4.2.1), where the next step
+    /* Tunable parameters change at events from outside (2.0.5 and 3.0.2, section 2.2.7 and 2.4.7): in Event Mode, and
+       at communication points of Co-Simulation, with or without event mode (3.0.2, section 4.2.1), where the next step
        handles what they bring about. */
     case BANK_PARAMETER: return before_start || (variable->tunable && (mode & (MODE_EVENT | MODE_STEP)) != 0);
     case BANK_OPTION: return before_start;
@@ -28,21 +28,21 @@ static bool may_be_set(const Variable *variable, int mode)
     }
 }
 
-const Variable *find_variable(const Instance *instance, const char *function, Reference reference)
+const Variable *instance_variable(const Instance *instance, const char *function, Reference reference)
 {
     if (reference < description.n_variables)
         return &description.variables[reference];
-    refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name, function,
-           (unsigned long)reference);
+    instance_refuse(instance, "%s: %s: there is no variable with the value reference %lu.", instance->name, function,
+                    (unsigned long)reference);
     return NULL;
 }
 
-Answer check_type(const Instance *instance, const char *function, const Variable *variable, Type type)
+Answer instance_check_type(const Instance *instance, const char *function, const Variable *variable, Type type)
 {
     if (variable->type == type)
         return ANSWER_OK;
-    return refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.", instance->name,
-                  function, NAME_OF(variable), type_name((Type)variable->type));
+    return instance_refuse(instance, "%s: %s: '%s' is of type %s. Remedy: use the function of that type.",
+                           instance->name, function, NAME_OF(variable), type_name((Type)variable->type));
 }
 
 /* Checks the arguments of a getter or setter before anything is written. */
@@ -51,23 +51,23 @@ static Answer check_access(const Instance *instance, const char *function, Type 
 {
     size_t needed = 0;
     if (n > 0 && (!references || !values))
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     for (size_t i = 0; i < n; i++) {
-        const Variable *variable = find_variable(instance, function, references[i]);
-        if (!variable || check_type(instance, function, variable, type) != ANSWER_OK)
+        const Variable *variable = instance_variable(instance, function, references[i]);
+        if (!variable || instance_check_type(instance, function, variable, type) != ANSWER_OK)
             return ANSWER_ERROR;
         if (set && !may_be_set(variable, instance->run->mode))
-            return refuse(instance, "%s: %s: '%s' cannot be set in the state '%s'.", instance->name, function,
-                          NAME_OF(variable), mode_name(instance->run->mode));
+            return instance_refuse(instance, "%s: %s: '%s' cannot be set in the state '%s'.", instance->name, function,
+                                   NAME_OF(variable), instance_mode_name(instance->run->mode));
         needed += variable->size;
     }
     if (n_values != needed)
-        return refuse(instance, "%s: %s: %zu values for %zu elements of the %zu variables.", instance->name, function,
-                      n_values, needed, n);
+        return instance_refuse(instance, "%s: %s: %zu values for %zu elements of the %zu variables.", instance->name,
+                               function, n_values, needed, n);
     return ANSWER_OK;
 }
 
-View view_now(const Instance *instance)
+View instance_view(const Instance *instance)
 {
     int mode = instance->run->mode;
     if (mode & (MODE_INSTANTIATED | MODE_CONFIGURATION | MODE_INITIALIZATION))
@@ -85,11 +85,11 @@ static const double *elements(const Instance *instance, const Variable *variable
     case BANK_OPTION: *own = run->stop_at_events; return own;
     default: break;
     }
-    const double *values = engine_values(instance->engine, view_now(instance), (Bank)variable->bank);
+    const double *values = engine_values(instance->engine, instance_view(instance), (Bank)variable->bank);
     if (values)
         return values + variable->index;
-    refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, NAME_OF(variable),
-           engine_problem(instance->engine));
+    instance_refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, NAME_OF(variable),
+                    engine_problem(instance->engine));
     return NULL;
 }
 
@@ -109,20 +109,21 @@ static Answer read_variable(const Instance *instance, const Variable *variable, 
     for (size_t k = 0; k < variable->size; k++) {
         double value = variable->type == TYPE_INT32 ? floor(from[k] + 0.5) : from[k];
         if (!fits(variable, value))
-            return refuse(instance, "%s: '%s' is %g at t = %.17g, which a value of type %s must not be. Remedy: check "
-                          "its expression, the parameters and the inputs.",
-                          instance->name, NAME_OF(variable), from[k], instance->run->time,
-                          type_name((Type)variable->type));
+            return instance_refuse(instance,
+                                   "%s: '%s' is %g at t = %.17g, which a value of type %s must not be. Remedy: check "
+                                   "its expression, the parameters and the inputs.",
+                                   instance->name, NAME_OF(variable), from[k], instance->run->time,
+                                   type_name((Type)variable->type));
         if (store)
             store(values, at + k, value);
     }
     return ANSWER_OK;
 }
 
-Answer instance_get(void *handle, const char *function, Type type, const Reference references[], size_t n,
-                    void *values, size_t n_values, StoreValue *store)
+Answer instance_get(void *handle, const char *function, Type type, const Reference references[], size_t n, void *values,
+                    size_t n_values, StoreValue *store)
 {
-    Instance *instance = enter(handle, function, MODE_ANY);
+    Instance *instance = instance_enter(handle, function, MODE_ANY);
     if (!instance || check_access(instance, function, type, false, references, n, values, n_values) != ANSWER_OK)
         return ANSWER_ERROR;
     for (size_t i = 0; i < n; i++)
@@ -136,12 +137,13 @@ Answer instance_get(void *handle, const char *function, Type type, const Referen
 static Answer check_value(const Instance *instance, const char *function, const Variable *variable, double value)
 {
     if (!isfinite(value))
-        return refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function, value,
-                      NAME_OF(variable));
+        return instance_refuse(instance, "%s: %s: the value %g for '%s' must be finite.", instance->name, function,
+                               value, NAME_OF(variable));
     if (variable->bank == BANK_SIZE && value != (double)variable->index)
-        return refuse(instance, "%s: %s: the length '%s' is %lu in this FMU and cannot become %.0f. Remedy: export the "
-                      "model with that length.", instance->name, function, NAME_OF(variable),
-                      (unsigned long)variable->index, value);
+        return instance_refuse(instance,
+                               "%s: %s: the length '%s' is %lu in this FMU and cannot become %.0f. Remedy: export the "
+                               "model with that length.",
+                               instance->name, function, NAME_OF(variable), (unsigned long)variable->index, value);
     return ANSWER_OK;
 }
 
@@ -156,7 +158,7 @@ static void write_element(Instance *instance, const Variable *variable, size_t k
 Answer instance_set(void *handle, const char *function, Type type, const Reference references[], size_t n,
                     const void *values, size_t n_values, LoadValue *load)
 {
-    Instance *instance = enter(handle, function, MODE_SETTABLE);
+    Instance *instance = instance_enter(handle, function, MODE_SETTABLE);
     if (!instance || check_access(instance, function, type, true, references, n, values, n_values) != ANSWER_OK)
         return ANSWER_ERROR;
     for (size_t i = 0, at = 0; i < n; i++)
@@ -171,10 +173,10 @@ Answer instance_set(void *handle, const char *function, Type type, const Referen
 
 Answer instance_no_type(void *handle, const char *function, size_t n, bool set)
 {
-    Instance *instance = enter(handle, function, set ? MODE_SETTABLE : MODE_ANY);
+    Instance *instance = instance_enter(handle, function, set ? MODE_SETTABLE : MODE_ANY);
     if (!instance)
         return ANSWER_ERROR;
     if (n == 0)
         return ANSWER_OK;
-    return refuse(instance, "%s: %s: no variable of this FMU has that type.", instance->name, function);
+    return instance_refuse(instance, "%s: %s: no variable of this FMU has that type.", instance->name, function);
 }

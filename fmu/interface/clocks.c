@@ -7,10 +7,10 @@ static Answer check_clocks(const Instance *instance, const char *function, const
                            const void *values)
 {
     if (n > 0 && (!references || !values))
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     for (size_t i = 0; i < n; i++) {
-        const Variable *variable = find_variable(instance, function, references[i]);
-        if (!variable || check_type(instance, function, variable, TYPE_CLOCK) != ANSWER_OK)
+        const Variable *variable = instance_variable(instance, function, references[i]);
+        if (!variable || instance_check_type(instance, function, variable, TYPE_CLOCK) != ANSWER_OK)
             return ANSWER_ERROR;
     }
     return ANSWER_OK;
@@ -23,8 +23,8 @@ static Answer check_countdowns(const Instance *instance, const char *function, c
         return ANSWER_ERROR;
     for (size_t i = 0; i < n; i++)
         if (description.variables[references[i]].bank != BANK_COUNTDOWN)
-            return refuse(instance, "%s: %s: '%s' is an output clock, which ticks by itself.", instance->name,
-                          function, NAME_OF(&description.variables[references[i]]));
+            return instance_refuse(instance, "%s: %s: '%s' is an output clock, which ticks by itself.", instance->name,
+                                   function, NAME_OF(&description.variables[references[i]]));
     return ANSWER_OK;
 }
 
@@ -32,7 +32,7 @@ static Answer check_countdowns(const Instance *instance, const char *function, c
    first iteration those whose jumps were taken inside the last step. */
 Answer instance_get_clocks(void *handle, const char *function, const Reference references[], size_t n, bool active[])
 {
-    Instance *instance = enter(handle, function, MODE_ANY);
+    Instance *instance = instance_enter(handle, function, MODE_ANY);
     if (!instance || check_clocks(instance, function, references, n, active) != ANSWER_OK)
         return ANSWER_ERROR;
     bool in_event_mode = instance->run->mode == MODE_EVENT;
@@ -41,8 +41,8 @@ Answer instance_get_clocks(void *handle, const char *function, const Reference r
         const Variable *clock = &description.variables[references[i]];
         bool pends = pending < model.n_jumps;
         if (clock->bank == BANK_CLOCK)
-            pends = (pends && clock->index == pending) ||
-                    (in_event_mode && engine_ticked(instance->engine, clock->index));
+            pends =
+                (pends && clock->index == pending) || (in_event_mode && engine_ticked(instance->engine, clock->index));
         active[i] = pends;
     }
     return ANSWER_OK;
@@ -51,7 +51,7 @@ Answer instance_get_clocks(void *handle, const char *function, const Reference r
 Answer instance_set_clocks(void *handle, const char *function, const Reference references[], size_t n,
                            const bool active[])
 {
-    Instance *instance = enter(handle, function, MODE_EVENT);
+    Instance *instance = instance_enter(handle, function, MODE_EVENT);
     /* The event is due by its own time: the tick tells nothing new, and one that comes early does nothing. */
     if (!instance || check_countdowns(instance, function, references, n, active) != ANSWER_OK)
         return ANSWER_ERROR;
@@ -64,7 +64,7 @@ Answer instance_set_clocks(void *handle, const char *function, const Reference r
 Answer instance_get_interval(void *handle, const char *function, const Reference references[], size_t n,
                              const void *places, double *interval, Qualifier *qualifier)
 {
-    Instance *instance = enter(handle, function, MODE_INITIALIZATION | MODE_EVENT);
+    Instance *instance = instance_enter(handle, function, MODE_INITIALIZATION | MODE_EVENT);
     if (!instance || check_countdowns(instance, function, references, n, places) != ANSWER_OK)
         return ANSWER_ERROR;
     Run *run = instance->run;

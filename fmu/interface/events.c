@@ -5,27 +5,27 @@
 
 Answer instance_enter_event_mode(void *handle, const char *function, int modes)
 {
-    Instance *instance = enter(handle, function, modes);
+    Instance *instance = instance_enter(handle, function, modes);
     if (!instance)
         return ANSWER_ERROR;
     bool stepping = instance->interface == CO_SIMULATION;
     if (stepping && !instance->event_mode_used)
-        return refuse(instance, "%s: %s: the FMU was instantiated with eventModeUsed = false.", instance->name,
-                      function);
+        return instance_refuse(instance, "%s: %s: the FMU was instantiated with eventModeUsed = false.", instance->name,
+                               function);
     if (!stepping && instance->run->mode == MODE_CONTINUOUS && !engine_arrive(instance->engine))
-        return refuse(instance, "%s: %s", instance->name, engine_problem(instance->engine));
+        return instance_refuse(instance, "%s: %s", instance->name, engine_problem(instance->engine));
     instance->run->mode = MODE_EVENT;
     return ANSWER_OK;
 }
 
 Answer instance_leave_event_mode(void *handle, const char *function, int mode)
 {
-    Instance *instance = enter(handle, function, MODE_EVENT);
+    Instance *instance = instance_enter(handle, function, MODE_EVENT);
     if (!instance)
         return ANSWER_ERROR;
     if ((instance->interface == CO_SIMULATION) != (mode == MODE_STEP))
-        return refuse(instance, "%s: %s: an instance of this kind has no '%s'.", instance->name, function,
-                      mode_name(mode));
+        return instance_refuse(instance, "%s: %s: an instance of this kind has no '%s'.", instance->name, function,
+                               instance_mode_name(mode));
     engine_clear_ticks(instance->engine);
     if (mode == MODE_CONTINUOUS)
         engine_note_rates(instance->engine);
@@ -47,7 +47,7 @@ static bool next_event(const Instance *instance, double *event_time)
 
 Answer instance_update(void *handle, const char *function, EventUpdate *update)
 {
-    Instance *instance = enter(handle, function, MODE_EVENT);
+    Instance *instance = instance_enter(handle, function, MODE_EVENT);
     if (!instance)
         return ANSWER_ERROR;
     Engine *engine = instance->engine;
@@ -55,8 +55,8 @@ Answer instance_update(void *handle, const char *function, EventUpdate *update)
     bool changed = false;
     *update = (EventUpdate){.terminate = !engine_jump(engine, &changed)};
     /* True only where a value is another one: 2.0.5, section 3.2.2, forbids it elsewhere, and in 3.0.2, section 2.3.5,
-       it says that a state was re-initialised to another value.  So a jump that changes nothing but the mode of the flow
-       is not told apart from none, and an importer restarts its solver after every event. */
+       it says that a state was re-initialised to another value.  So a jump that changes nothing but the mode of the
+       flow is not told apart from none, and an importer restarts its solver after every event. */
     update->states_changed = changed;
     update->again = !update->terminate && engine_pending(engine) < model.n_jumps;
     /* This iteration's clocks are over; the next one's are those of the jump that comes next. */
@@ -74,6 +74,6 @@ Answer instance_update(void *handle, const char *function, EventUpdate *update)
     run->next_event = counts ? update->next : (double)INFINITY;
     run->interval_told = false;
     if (update->terminate)
-        refuse(instance, "%s: %s", instance->name, engine_message(engine));
+        instance_refuse(instance, "%s: %s", instance->name, engine_message(engine));
     return ANSWER_OK;
 }

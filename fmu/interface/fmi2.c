@@ -160,9 +160,9 @@ SIMPLE(fmi2EnterContinuousTimeMode, instance_leave_event_mode(c, __func__, MODE_
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo)
 {
     EventUpdate found;
-    Instance *instance = enter(c, __func__, MODE_EVENT);
+    Instance *instance = instance_enter(c, __func__, MODE_EVENT);
     if (!instance || !eventInfo)
-        return status_of(instance ? null_argument(instance, __func__) : ANSWER_ERROR);
+        return status_of(instance ? instance_null_argument(instance, __func__) : ANSWER_ERROR);
     Answer answer = instance_update(c, __func__, &found);
     const fmi2EventInfo info = {found.again, found.terminate, found.nominals_changed, found.states_changed,
                                 found.has_next, found.next};
@@ -226,7 +226,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint)
 {
     StepReport report;
-    Instance *instance = enter(c, __func__, MODE_STEP);
+    Instance *instance = instance_enter(c, __func__, MODE_STEP);
     (void)noSetFMUStatePriorToCurrentPoint;
     if (!instance)
         return fmi2Error;
@@ -238,19 +238,19 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
 
 fmi2Status fmi2CancelStep(fmi2Component c)
 {
-    const Instance *instance = enter(c, __func__, MODE_ANY);
+    const Instance *instance = instance_enter(c, __func__, MODE_ANY);
     if (instance)
-        refuse(instance, "%s: %s: a step is never under way when it returns, so there is none to cancel.",
-               instance->name, __func__);
+        instance_refuse(instance, "%s: %s: a step is never under way when it returns, so there is none to cancel.",
+                        instance->name, __func__);
     return fmi2Error;
 }
 
 static fmi2Status no_such_status(fmi2Component c, const char *function, fmi2StatusKind s)
 {
-    const Instance *instance = enter_kind(c, function, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
+    const Instance *instance = instance_enter_kind(c, function, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
     if (!instance)
         return fmi2Error;
-    refuse(instance, "%s: %s: there is no status of kind %d of that type.", instance->name, function, (int)s);
+    instance_refuse(instance, "%s: %s: there is no status of kind %d of that type.", instance->name, function, (int)s);
     return fmi2Discard;
 }
 
@@ -262,9 +262,9 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *va
 
 fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value)
 {
-    const Instance *instance = enter_kind(c, __func__, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
+    const Instance *instance = instance_enter_kind(c, __func__, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
     if (!instance || !value)
-        return status_of(instance ? null_argument(instance, __func__) : ANSWER_ERROR);
+        return status_of(instance ? instance_null_argument(instance, __func__) : ANSWER_ERROR);
     if (s != fmi2LastSuccessfulTime)
         return no_such_status(c, __func__, s);
     *value = instance->run->time;
@@ -279,9 +279,9 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
 
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value)
 {
-    const Instance *instance = enter_kind(c, __func__, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
+    const Instance *instance = instance_enter_kind(c, __func__, CO_SIMULATION, MODE_STEP | MODE_TERMINATED);
     if (!instance || !value)
-        return status_of(instance ? null_argument(instance, __func__) : ANSWER_ERROR);
+        return status_of(instance ? instance_null_argument(instance, __func__) : ANSWER_ERROR);
     if (s != fmi2Terminated)
         return no_such_status(c, __func__, s);
     *value = instance->run->end_reported != 0;

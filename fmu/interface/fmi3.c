@@ -58,14 +58,14 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     Fmi3 made = prototype(CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
     (void)resourcePath, (void)visible;
     if (nRequiredIntermediateVariables > 0 && !requiredIntermediateVariables) {
-        refuse(&made.base, "%s: there are %zu intermediate variables, but no place where they are.", __func__,
-               nRequiredIntermediateVariables);
+        instance_refuse(&made.base, "%s: there are %zu intermediate variables, but no place where they are.", __func__,
+                        nRequiredIntermediateVariables);
         return NULL;
     }
     for (size_t i = 0; i < nRequiredIntermediateVariables; i++)
         if (requiredIntermediateVariables[i] >= description.n_variables) {
-            refuse(&made.base, "%s: there is no variable with the value reference %lu.", __func__,
-                   (unsigned long)requiredIntermediateVariables[i]);
+            instance_refuse(&made.base, "%s: there is no variable with the value reference %lu.", __func__,
+                            (unsigned long)requiredIntermediateVariables[i]);
             return NULL;
         }
     made.base.event_mode_used = eventModeUsed;
@@ -84,7 +84,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     const Fmi3 nobody = prototype(CO_SIMULATION, instanceName, loggingOn, instanceEnvironment, logMessage);
     (void)instantiationToken, (void)resourcePath, (void)visible;
     (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
-    refuse(&nobody.base, "%s: this FMU is not for Scheduled Execution.", __func__);
+    instance_refuse(&nobody.base, "%s: this FMU is not for Scheduled Execution.", __func__);
     return NULL;
 }
 
@@ -125,12 +125,12 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
                                     fmi3Float64 *nextEventTime)
 {
     EventUpdate update;
-    Instance *own = enter(instance, __func__, MODE_EVENT);
+    Instance *own = instance_enter(instance, __func__, MODE_EVENT);
     if (!own)
         return fmi3Error;
     if (!discreteStatesNeedUpdate || !terminateSimulation || !nominalsOfContinuousStatesChanged ||
         !valuesOfContinuousStatesChanged || !nextEventTimeDefined || !nextEventTime)
-        return status_of(null_argument(own, __func__));
+        return status_of(instance_null_argument(own, __func__));
     Answer answer = instance_update(own, __func__, &update);
     *discreteStatesNeedUpdate = update.again;
     *terminateSimulation = update.terminate;
@@ -163,12 +163,12 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
                       fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
 {
     StepReport report;
-    Fmi3 *own = (Fmi3 *)enter(instance, __func__, MODE_STEP);
+    Fmi3 *own = (Fmi3 *)instance_enter(instance, __func__, MODE_STEP);
     (void)noSetFMUStatePriorToCurrentPoint;
     if (!own)
         return fmi3Error;
     if (!eventHandlingNeeded || !terminateSimulation || !earlyReturn || !lastSuccessfulTime)
-        return status_of(null_argument(&own->base, __func__));
+        return status_of(instance_null_argument(&own->base, __func__));
     bool events = own->base.event_mode_used;
     EventPolicy policy = !events                          ? EVENTS_INSIDE
                          : own->base.early_return_allowed ? EVENTS_STOP
@@ -217,11 +217,11 @@ DEFINE_VECTOR(fmi3GetNominalsOfContinuousStates, instance_nominals(instance, __f
 #define DEFINE_COUNT(NAME, COUNT)                                                                                      \
     fmi3Status NAME(fmi3Instance instance, size_t *count)                                                              \
     {                                                                                                                  \
-        const Instance *own = enter(instance, __func__, MODE_ANY);                                                     \
+        const Instance *own = instance_enter(instance, __func__, MODE_ANY);                                            \
         if (!own)                                                                                                      \
             return fmi3Error;                                                                                          \
         if (!count)                                                                                                    \
-            return status_of(null_argument(own, __func__));                                                            \
+            return status_of(instance_null_argument(own, __func__));                                                   \
         *count = COUNT;                                                                                                \
         return fmi3OK;                                                                                                 \
     }

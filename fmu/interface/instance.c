@@ -10,7 +10,7 @@
 #define ERROR_CATEGORY "logStatusError"
 #define EVENT_CATEGORY "logEvents"
 
-Answer refuse(const Instance *instance, const char *format, ...)
+Answer instance_refuse(const Instance *instance, const char *format, ...)
 {
     char message[1024];
     va_list arguments;
@@ -19,12 +19,12 @@ Answer refuse(const Instance *instance, const char *format, ...)
     va_start(arguments, format);
     vsnprintf(message, sizeof message, format, arguments);
     va_end(arguments);
-    end_text_cleanly(message);
+    engine_end_text(message);
     instance->log_line(instance, ANSWER_ERROR, ERROR_CATEGORY, message);
     return ANSWER_ERROR;
 }
 
-const char *mode_name(int mode)
+const char *instance_mode_name(int mode)
 {
     switch (mode) {
     case MODE_INSTANTIATED: return "Instantiated";
@@ -38,33 +38,33 @@ const char *mode_name(int mode)
     }
 }
 
-Instance *enter(void *handle, const char *function, int modes)
+Instance *instance_enter(void *handle, const char *function, int modes)
 {
     Instance *instance = handle;
     if (!instance)
         return NULL;
     if (instance->run->mode & modes)
         return instance;
-    refuse(instance, "%s: %s must not be called in the state '%s'.", instance->name, function,
-           mode_name(instance->run->mode));
+    instance_refuse(instance, "%s: %s must not be called in the state '%s'.", instance->name, function,
+                    instance_mode_name(instance->run->mode));
     return NULL;
 }
 
-Instance *enter_kind(void *handle, const char *function, Interface kind, int modes)
+Instance *instance_enter_kind(void *handle, const char *function, Interface kind, int modes)
 {
     static const char *const KINDS[] = {"Co-Simulation", "Model Exchange"};
-    Instance *instance = enter(handle, function, modes);
+    Instance *instance = instance_enter(handle, function, modes);
     if (!instance || instance->interface == kind)
         return instance;
-    refuse(instance, "%s: %s is for %s, but this is an instance for %s.", instance->name, function, KINDS[kind],
-           KINDS[instance->interface]);
+    instance_refuse(instance, "%s: %s is for %s, but this is an instance for %s.", instance->name, function,
+                    KINDS[kind], KINDS[instance->interface]);
     return NULL;
 }
 
-Answer null_argument(const Instance *instance, const char *function)
+Answer instance_null_argument(const Instance *instance, const char *function)
 {
-    return refuse(instance, "%s: %s was called with a null pointer; every argument needs a place to point to.",
-                  instance->name, function);
+    return instance_refuse(instance, "%s: %s was called with a null pointer; every argument needs a place to point to.",
+                           instance->name, function);
 }
 
 static void log_jump(void *context, double time, size_t jump)
@@ -75,7 +75,7 @@ static void log_jump(void *context, double time, size_t jump)
         return;
     snprintf(message, sizeof message, "%s: '%s' jumps at t = %.17g.", instance->name,
              NAME_AT(model.names, model.jumps[jump].name), time);
-    end_text_cleanly(message);
+    engine_end_text(message);
     instance->log_line(instance, ANSWER_OK, EVENT_CATEGORY, message);
 }
 
@@ -127,21 +127,24 @@ Instance *instance_new(const Instance *prototype, size_t size, const char *funct
     const char *kind = prototype->interface == CO_SIMULATION ? "Co-Simulation" : "Model Exchange";
     const char *name = prototype->name;
     if (is_blank(name)) {
-        refuse(prototype, "%s: the instance name is missing; it needs at least one visible character.", function);
+        instance_refuse(prototype, "%s: the instance name is missing; it needs at least one visible character.",
+                        function);
         return NULL;
     }
     if (!token || strcmp(token, description.token) != 0) {
-        refuse(prototype, "%s: %s: the instantiation token '%s' is not this FMU's '%s'. Remedy: use the "
-               "modelDescription.xml of the same FMU.", name, function, token ? token : "(null)", description.token);
+        instance_refuse(prototype,
+                        "%s: %s: the instantiation token '%s' is not this FMU's '%s'. Remedy: use the "
+                        "modelDescription.xml of the same FMU.",
+                        name, function, token ? token : "(null)", description.token);
         return NULL;
     }
     if (prototype->interface == CO_SIMULATION ? !description.co_simulation : !description.model_exchange) {
-        refuse(prototype, "%s: %s: this FMU is not for %s.", name, function, kind);
+        instance_refuse(prototype, "%s: %s: this FMU is not for %s.", name, function, kind);
         return NULL;
     }
     Instance *instance = allocate(prototype, size);
     if (!instance)
-        refuse(prototype, "%s: %s: out of memory.", name, function);
+        instance_refuse(prototype, "%s: %s: out of memory.", name, function);
     return instance;
 }
 
@@ -149,7 +152,7 @@ void instance_free(void *handle, const char *function)
 {
     Instance *instance = handle;
     /* Within a callback the FMU still needs the instance. */
-    if (!instance || !enter(instance, function, MODE_OUTSIDE))
+    if (!instance || !instance_enter(instance, function, MODE_OUTSIDE))
         return;
     char *name = (char *)instance->name;
     release(instance, name);
@@ -157,7 +160,7 @@ void instance_free(void *handle, const char *function)
 
 Answer instance_reset(void *handle, const char *function)
 {
-    Instance *instance = enter(handle, function, MODE_OUTSIDE);
+    Instance *instance = instance_enter(handle, function, MODE_OUTSIDE);
     if (!instance)
         return ANSWER_ERROR;
     set_up(instance);
@@ -166,7 +169,7 @@ Answer instance_reset(void *handle, const char *function)
 
 Answer instance_terminate(void *handle, const char *function)
 {
-    Instance *instance = enter(handle, function, MODE_EVENT | MODE_STEP | MODE_CONTINUOUS);
+    Instance *instance = instance_enter(handle, function, MODE_EVENT | MODE_STEP | MODE_CONTINUOUS);
     if (!instance)
         return ANSWER_ERROR;
     instance->run->mode = MODE_TERMINATED;
@@ -175,21 +178,22 @@ Answer instance_terminate(void *handle, const char *function)
 
 Answer instance_log(void *handle, const char *function, bool on, size_t n, const char *const categories[])
 {
-    Instance *instance = enter(handle, function, MODE_ANY);
+    Instance *instance = instance_enter(handle, function, MODE_ANY);
     unsigned chosen = n == 0 ? LOG_ERRORS | LOG_EVENTS : 0;
     if (!instance)
         return ANSWER_ERROR;
     if (n > 0 && !categories)
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     for (size_t i = 0; i < n; i++) {
         if (!categories[i])
-            return null_argument(instance, function);
+            return instance_null_argument(instance, function);
         unsigned bit = strcmp(categories[i], ERROR_CATEGORY) == 0   ? LOG_ERRORS
                        : strcmp(categories[i], EVENT_CATEGORY) == 0 ? LOG_EVENTS
                                                                     : 0;
         if (!bit)
-            return refuse(instance, "%s: %s: there is no log category '%s'; there are " ERROR_CATEGORY
-                          " and " EVENT_CATEGORY ".", instance->name, function, categories[i]);
+            return instance_refuse(
+                instance, "%s: %s: there is no log category '%s'; there are " ERROR_CATEGORY " and " EVENT_CATEGORY ".",
+                instance->name, function, categories[i]);
         chosen |= bit;
     }
     /* Errors are reported whether logging is on or not. */
@@ -203,5 +207,5 @@ Answer instance_unsupported(void *handle, const char *function)
     const Instance *instance = handle;
     if (!instance)
         return ANSWER_ERROR;
-    return refuse(instance, "%s: %s is not supported by this FMU.", instance->name, function);
+    return instance_refuse(instance, "%s: %s is not supported by this FMU.", instance->name, function);
 }

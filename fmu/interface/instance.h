@@ -70,13 +70,13 @@ struct Instance {
 Instance *instance_new(const Instance *prototype, size_t size, const char *function, const char *token);
 /* Logs an error, also when logging is switched off, if there is a logger; always ANSWER_ERROR, so that
    callers can return it. */
-Answer refuse(const Instance *instance, const char *format, ...) LIKE_PRINTF(2, 3);
-Answer null_argument(const Instance *instance, const char *function);
+Answer instance_refuse(const Instance *instance, const char *format, ...) LIKE_PRINTF(2, 3);
+Answer instance_null_argument(const Instance *instance, const char *function);
 /* The instance, if the function may be called now; NULL (and one log line) otherwise. */
-Instance *enter(void *handle, const char *function, int modes);
+Instance *instance_enter(void *handle, const char *function, int modes);
 /* The same for a function of one kind of instances only. */
-Instance *enter_kind(void *handle, const char *function, Interface kind, int modes);
-const char *mode_name(int mode);
+Instance *instance_enter_kind(void *handle, const char *function, Interface kind, int modes);
+const char *instance_mode_name(int mode);
 void instance_free(void *handle, const char *function);
 Answer instance_reset(void *handle, const char *function);
 Answer instance_terminate(void *handle, const char *function);
@@ -100,8 +100,8 @@ typedef void StoreValue(void *values, size_t i, double value);
 typedef double LoadValue(const void *values, size_t i);
 
 /* The variable of a value reference; NULL (and one log line) if there is none. */
-const Variable *find_variable(const Instance *instance, const char *function, Reference reference);
-Answer check_type(const Instance *instance, const char *function, const Variable *variable, Type type);
+const Variable *instance_variable(const Instance *instance, const char *function, Reference reference);
+Answer instance_check_type(const Instance *instance, const char *function, const Variable *variable, Type type);
 /* All or nothing: a value that cannot be had, or must not be set, leaves everything as it was. */
 Answer instance_get(void *handle, const char *function, Type type, const Reference references[], size_t n,
                     void *values, size_t n_values, StoreValue *store);
@@ -110,7 +110,7 @@ Answer instance_set(void *handle, const char *function, Type type, const Referen
 /* A type that no variable has: nothing to do for no variables, an error otherwise. */
 Answer instance_no_type(void *handle, const char *function, size_t n, bool set);
 /* The view of the engine that readers get in the present mode. */
-View view_now(const Instance *instance);
+View instance_view(const Instance *instance);
 /* Some other function that this FMU does not have. */
 Answer instance_unsupported(void *handle, const char *function);
 

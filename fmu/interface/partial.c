@@ -23,23 +23,23 @@ static Answer check_direction(const Instance *instance, const char *function, co
     const void *values = direction->seeds ? (const void *)direction->seeds : direction->results;
     size_t needed = 0;
     if (direction->n > 0 && (!direction->references || !values))
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     for (size_t i = 0; i < direction->n; i++) {
-        const Variable *variable = find_variable(instance, function, direction->references[i]);
+        const Variable *variable = instance_variable(instance, function, direction->references[i]);
         if (!variable)
             return ANSWER_ERROR;
         if (variable->type != TYPE_FLOAT64 || place_of(variable, known) == N_SEEDS)
-            return refuse(instance, "%s: %s: '%s' is none of the %s that derivatives are of.", instance->name,
-                          function, NAME_OF(variable), known ? "knowns" : "unknowns");
+            return instance_refuse(instance, "%s: %s: '%s' is none of the %s that derivatives are of.", instance->name,
+                                   function, NAME_OF(variable), known ? "knowns" : "unknowns");
         needed += variable->size;
     }
     if (direction->n_values != needed)
-        return refuse(instance, "%s: %s: %zu values for %zu elements of the %zu variables.", instance->name, function,
-                      direction->n_values, needed, direction->n);
+        return instance_refuse(instance, "%s: %s: %zu values for %zu elements of the %zu variables.", instance->name,
+                               function, direction->n_values, needed, direction->n);
     for (size_t i = 0; i < needed; i++)
         if (direction->seeds && !isfinite(direction->seeds[i]))
-            return refuse(instance, "%s: %s: the seed %g must be finite.", instance->name, function,
-                          direction->seeds[i]);
+            return instance_refuse(instance, "%s: %s: the seed %g must be finite.", instance->name, function,
+                                   direction->seeds[i]);
     return ANSWER_OK;
 }
 
@@ -77,7 +77,7 @@ static bool all_finite(const Direction *direction, bool known, double *const pla
 Answer instance_derivatives(void *handle, const char *function, const Direction *unknowns, const Direction *knowns,
                             bool forward)
 {
-    Instance *instance = enter(handle, function, MODE_RUNNING);
+    Instance *instance = instance_enter(handle, function, MODE_RUNNING);
     double *places[N_SEEDS];
     if (!instance || check_direction(instance, function, unknowns, false) != ANSWER_OK ||
         check_direction(instance, function, knowns, true) != ANSWER_OK)
@@ -86,13 +86,13 @@ Answer instance_derivatives(void *handle, const char *function, const Direction 
     const Direction *from = forward ? knowns : unknowns, *to = forward ? unknowns : knowns;
     engine_seeds(engine, places);
     scatter(from, forward, places);
-    bool done = forward ? engine_forward(engine, view_now(instance), places)
-                        : engine_reverse(engine, view_now(instance), places);
+    bool done = forward ? engine_forward(engine, instance_view(instance), places)
+                        : engine_reverse(engine, instance_view(instance), places);
     if (!done)
-        return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+        return instance_refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
     if (!all_finite(to, !forward, places)) {
-        refuse(instance, "%s: %s: the derivatives are not finite at t = %.17g.", instance->name, function,
-               instance->run->time);
+        instance_refuse(instance, "%s: %s: the derivatives are not finite at t = %.17g.", instance->name, function,
+                        instance->run->time);
         return ANSWER_DISCARD;
     }
     gather(to, !forward, places);
@@ -103,30 +103,30 @@ Answer instance_output_rates(void *handle, const char *function, const Reference
                              const int32_t orders[], double values[], size_t n_values)
 {
     const int modes = MODE_STEP | MODE_INTERMEDIATE | MODE_TERMINATED;
-    Instance *instance = enter_kind(handle, function, CO_SIMULATION, modes);
+    Instance *instance = instance_enter_kind(handle, function, CO_SIMULATION, modes);
     double *places[N_SEEDS];
     const Direction wanted = {.references = references, .n = n, .results = values, .n_values = n_values};
     if (!instance || check_direction(instance, function, &wanted, false) != ANSWER_OK)
         return ANSWER_ERROR;
     if (n > 0 && !orders)
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     for (size_t i = 0; i < n; i++)
         if (orders[i] != 1)
-            return refuse(instance, "%s: %s: derivatives of order %ld are not computed, only the first.",
-                          instance->name, function, (long)orders[i]);
+            return instance_refuse(instance, "%s: %s: derivatives of order %ld are not computed, only the first.",
+                                   instance->name, function, (long)orders[i]);
     Engine *engine = instance->engine;
-    const double *rates = engine_values(engine, view_now(instance), BANK_DERIVATIVE);
+    const double *rates = engine_values(engine, instance_view(instance), BANK_DERIVATIVE);
     if (!rates)
-        return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+        return instance_refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
     engine_seeds(engine, places);
     *places[SEED_TIME] = 1.0;
     for (size_t i = 0; i < model.n_states; i++)
         places[SEED_STATES][i] = rates[i];
-    if (!engine_forward(engine, view_now(instance), places))
-        return refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
+    if (!engine_forward(engine, instance_view(instance), places))
+        return instance_refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));
     if (!all_finite(&wanted, false, places))
-        return refuse(instance, "%s: %s: the derivatives are not finite at t = %.17g.", instance->name, function,
-                      instance->run->time);
+        return instance_refuse(instance, "%s: %s: the derivatives are not finite at t = %.17g.", instance->name,
+                               function, instance->run->time);
     gather(&wanted, false, places);
     return ANSWER_OK;
 }

@@ -13,8 +13,15 @@ typedef struct {
 } Saved;
 
 /* The bytes: magic, version, length of what follows, checksum of it, token of the model; then the block. */
-enum { MAGIC_SIZE = 8, TOKEN_SIZE = 32, AT_VERSION = 8, AT_LENGTH = 16, AT_CHECKSUM = 24, AT_TOKEN = 32,
-       HEADER_SIZE = AT_TOKEN + TOKEN_SIZE };
+enum {
+    MAGIC_SIZE = 8,
+    TOKEN_SIZE = 32,
+    AT_VERSION = 8,
+    AT_LENGTH = 16,
+    AT_CHECKSUM = 24,
+    AT_TOKEN = 32,
+    HEADER_SIZE = AT_TOKEN + TOKEN_SIZE
+};
 static const unsigned char MAGIC[MAGIC_SIZE] = {'H', 'Y', 'B', 'R', 'I', 'D', 'S', '\n'};
 #define FORMAT_VERSION 1
 
@@ -25,7 +32,7 @@ static bool is_own(const Instance *instance, const Saved *saved)
 
 static Answer foreign_state(const Instance *instance, const char *function)
 {
-    return refuse(instance, "%s: %s: this is not a state of this FMU.", instance->name, function);
+    return instance_refuse(instance, "%s: %s: this is not a state of this FMU.", instance->name, function);
 }
 
 static Saved *new_state(const Instance *instance)
@@ -41,18 +48,18 @@ static Saved *new_state(const Instance *instance)
 
 Answer instance_save(void *handle, const char *function, void **state)
 {
-    Instance *instance = enter(handle, function, MODE_OUTSIDE);
+    Instance *instance = instance_enter(handle, function, MODE_OUTSIDE);
     if (!instance)
         return ANSWER_ERROR;
     if (!state)
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     Saved *saved = *state;
     if (saved && !is_own(instance, saved))
         return foreign_state(instance, function);
     if (!saved)
         saved = new_state(instance);
     if (!saved)
-        return refuse(instance, "%s: %s: out of memory.", instance->name, function);
+        return instance_refuse(instance, "%s: %s: out of memory.", instance->name, function);
     engine_save(instance->engine, saved->block);
     *state = saved;
     return ANSWER_OK;
@@ -75,28 +82,29 @@ static bool is_one_of(int mode, int modes)
 static Answer check_state(const Instance *instance, const char *function, Saved *saved)
 {
     if (!saved)
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     return is_own(instance, saved) ? ANSWER_OK : foreign_state(instance, function);
 }
 
 Answer instance_restore(void *handle, const char *function, const void *state)
 {
-    Instance *instance = enter(handle, function, MODE_OUTSIDE);
+    Instance *instance = instance_enter(handle, function, MODE_OUTSIDE);
     Saved *saved = (Saved *)state;
     if (!instance || check_state(instance, function, saved) != ANSWER_OK)
         return ANSWER_ERROR;
     const Run *run = engine_wrapper_in(instance->engine, saved->block);
     if (!is_one_of(run->mode, own_modes(instance)))
-        return refuse(instance, "%s: %s: the saved state is one of '%s', which this instance cannot be in. Remedy: "
-                      "restore it in an instance that was made in the same way.", instance->name, function,
-                      mode_name(run->mode));
+        return instance_refuse(instance,
+                               "%s: %s: the saved state is one of '%s', which this instance cannot be in. Remedy: "
+                               "restore it in an instance that was made in the same way.",
+                               instance->name, function, instance_mode_name(run->mode));
     engine_restore(instance->engine, saved->block);
     return ANSWER_OK;
 }
 
 Answer instance_forget(void *handle, const char *function, void **state)
 {
-    if (!enter(handle, function, MODE_ANY))
+    if (!instance_enter(handle, function, MODE_ANY))
         return ANSWER_ERROR;
     if (state) {
         free(*state);
@@ -139,26 +147,26 @@ static void put_token(unsigned char *bytes)
 
 Answer instance_serialized_size(void *handle, const char *function, const void *state, size_t *size)
 {
-    Instance *instance = enter(handle, function, MODE_ANY);
+    Instance *instance = instance_enter(handle, function, MODE_ANY);
     if (!instance || check_state(instance, function, (Saved *)state) != ANSWER_OK)
         return ANSWER_ERROR;
     if (!size)
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     *size = HEADER_SIZE + ((const Saved *)state)->size;
     return ANSWER_OK;
 }
 
 Answer instance_serialize(void *handle, const char *function, const void *state, unsigned char bytes[], size_t size)
 {
-    Instance *instance = enter(handle, function, MODE_ANY);
+    Instance *instance = instance_enter(handle, function, MODE_ANY);
     const Saved *saved = state;
     if (!instance || check_state(instance, function, (Saved *)state) != ANSWER_OK)
         return ANSWER_ERROR;
     if (!bytes)
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     if (size < HEADER_SIZE + saved->size)
-        return refuse(instance, "%s: %s: %zu bytes are too few; the state needs %zu.", instance->name, function, size,
-                      HEADER_SIZE + saved->size);
+        return instance_refuse(instance, "%s: %s: %zu bytes are too few; the state needs %zu.", instance->name,
+                               function, size, HEADER_SIZE + saved->size);
     memset(bytes, 0, HEADER_SIZE);
     memcpy(bytes, MAGIC, MAGIC_SIZE);
     put_number(bytes + AT_VERSION, FORMAT_VERSION);
@@ -195,20 +203,19 @@ static const char *fault(const Instance *instance, const unsigned char *bytes, s
     return NULL;
 }
 
-Answer instance_deserialize(void *handle, const char *function, const unsigned char bytes[], size_t size,
-                            void **state)
+Answer instance_deserialize(void *handle, const char *function, const unsigned char bytes[], size_t size, void **state)
 {
-    Instance *instance = enter(handle, function, MODE_ANY);
+    Instance *instance = instance_enter(handle, function, MODE_ANY);
     if (!instance)
         return ANSWER_ERROR;
     if (!bytes || !state)
-        return null_argument(instance, function);
+        return instance_null_argument(instance, function);
     if (*state && !is_own(instance, *state))
         return foreign_state(instance, function);
     const char *wrong = fault(instance, bytes, size);
     Saved *saved = wrong ? NULL : new_state(instance);
     if (!wrong && !saved)
-        return refuse(instance, "%s: %s: out of memory.", instance->name, function);
+        return instance_refuse(instance, "%s: %s: out of memory.", instance->name, function);
     if (saved) {
         memcpy(saved->block, bytes + HEADER_SIZE, saved->size);
         const Run *run = engine_wrapper_in(instance->engine, saved->block);
@@ -217,8 +224,10 @@ Answer instance_deserialize(void *handle, const char *function, const unsigned c
     }
     if (wrong) {
         free(saved);
-        return refuse(instance, "%s: %s: the %zu bytes are refused: %s. Remedy: give all the bytes that this FMU "
-                      "serialised.", instance->name, function, size, wrong);
+        return instance_refuse(instance,
+                               "%s: %s: the %zu bytes are refused: %s. Remedy: give all the bytes that this FMU "
+                               "serialised.",
+                               instance->name, function, size, wrong);
     }
     free(*state);
     *state = saved;

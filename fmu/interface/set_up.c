@@ -5,17 +5,18 @@
 
 Answer instance_set_up(void *handle, const char *function, const Experiment *experiment)
 {
-    Instance *instance = enter(handle, function, MODE_INSTANTIATED);
+    Instance *instance = instance_enter(handle, function, MODE_INSTANTIATED);
     double tolerance = experiment->tolerance, start = experiment->start, stop = experiment->stop;
     if (!instance)
         return ANSWER_ERROR;
     if (experiment->has_tolerance && !(isfinite(tolerance) && tolerance > 0.0))
-        return refuse(instance, "%s: the tolerance %g must be finite and above zero.", instance->name, tolerance);
+        return instance_refuse(instance, "%s: the tolerance %g must be finite and above zero.", instance->name,
+                               tolerance);
     if (!isfinite(start))
-        return refuse(instance, "%s: the start time %g must be finite.", instance->name, start);
+        return instance_refuse(instance, "%s: the start time %g must be finite.", instance->name, start);
     if (experiment->has_stop && !(isfinite(stop) && stop >= start))
-        return refuse(instance, "%s: the stop time %.17g must be finite and not before the start time %.17g.",
-                      instance->name, stop, start);
+        return instance_refuse(instance, "%s: the stop time %.17g must be finite and not before the start time %.17g.",
+                               instance->name, stop, start);
     if (experiment->has_tolerance)
         engine_set_tolerance(instance->engine, tolerance);
     instance->run->time = start;
@@ -26,7 +27,7 @@ Answer instance_set_up(void *handle, const char *function, const Experiment *exp
 
 Answer instance_enter_initialization(void *handle, const char *function)
 {
-    Instance *instance = enter(handle, function, MODE_INSTANTIATED);
+    Instance *instance = instance_enter(handle, function, MODE_INSTANTIATED);
     if (!instance)
         return ANSWER_ERROR;
     instance->run->mode = MODE_INITIALIZATION;
@@ -35,15 +36,15 @@ Answer instance_enter_initialization(void *handle, const char *function)
 
 Answer instance_exit_initialization(void *handle, const char *function)
 {
-    Instance *instance = enter(handle, function, MODE_INITIALIZATION);
+    Instance *instance = instance_enter(handle, function, MODE_INITIALIZATION);
     if (!instance)
         return ANSWER_ERROR;
     Engine *engine = instance->engine;
     bool events_outside = instance->interface == MODEL_EXCHANGE || instance->event_mode_used;
     if (!engine_start(engine))
-        return refuse(instance, "%s: %s", instance->name, engine_problem(engine));
+        return instance_refuse(instance, "%s: %s", instance->name, engine_problem(engine));
     if (!events_outside && !engine_jump_all(engine))
-        return refuse(instance, "%s: %s", instance->name, engine_message(engine));
+        return instance_refuse(instance, "%s: %s", instance->name, engine_message(engine));
     engine_clear_ticks(engine);
     instance->run->mode = events_outside ? MODE_EVENT : MODE_STEP;
     return ANSWER_OK;
@@ -51,7 +52,7 @@ Answer instance_exit_initialization(void *handle, const char *function)
 
 Answer instance_configure(void *handle, const char *function, bool begin)
 {
-    Instance *instance = enter(handle, function, begin ? MODE_INSTANTIATED : MODE_CONFIGURATION);
+    Instance *instance = instance_enter(handle, function, begin ? MODE_INSTANTIATED : MODE_CONFIGURATION);
     if (!instance)
         return ANSWER_ERROR;
     instance->run->mode = begin ? MODE_CONFIGURATION : MODE_INSTANTIATED;

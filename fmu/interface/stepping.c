@@ -9,7 +9,7 @@
 /* Rounding that an importer's own arithmetic may leave between two ways to write one time. */
 static double time_rounding(double a, double b)
 {
-    return 32.0 * time_ulp(fmax(fabs(a), fabs(b)));
+    return 32.0 * engine_time_ulp(fmax(fabs(a), fabs(b)));
 }
 
 static Answer check_step(const Instance *instance, const char *function, double point, double size, double target)
@@ -17,27 +17,29 @@ static Answer check_step(const Instance *instance, const char *function, double 
     const Run *run = instance->run;
     const char *name = instance->name;
     if (run->end_reported)
-        return refuse(instance, "%s: the run is over: %s", name, engine_message(instance->engine));
+        return instance_refuse(instance, "%s: the run is over: %s", name, engine_message(instance->engine));
     if (!isfinite(size) || size <= 0.0)
-        return refuse(instance, "%s: %s: the step size %g must be finite and above zero.", name, function, size);
+        return instance_refuse(instance, "%s: %s: the step size %g must be finite and above zero.", name, function,
+                               size);
     if (!isfinite(point) || !isfinite(target))
-        return refuse(instance, "%s: %s: the step from %g to %g must begin and end at finite times.", name, function,
-                      point, target);
+        return instance_refuse(instance, "%s: %s: the step from %g to %g must begin and end at finite times.", name,
+                               function, point, target);
     if (fabs(point - run->time) > time_rounding(point, fmax(fabs(run->time), size)))
-        return refuse(instance, "%s: %s: the step begins at %.17g, but the FMU is at %.17g; steps must follow each "
-                      "other without gap or repeat.",
-                      name, function, point, run->time);
+        return instance_refuse(instance,
+                               "%s: %s: the step begins at %.17g, but the FMU is at %.17g; steps must follow each "
+                               "other without gap or repeat.",
+                               name, function, point, run->time);
     /* An importer that adds up its steps is off by a rounding each time. */
     if (target > run->stop_time + fmax(time_rounding(target, run->stop_time), STOP_ROUNDING * fabs(run->stop_time)))
-        return refuse(instance, "%s: %s: the step ends at %.17g, after the stop time %.17g.", name, function, target,
-                      run->stop_time);
+        return instance_refuse(instance, "%s: %s: the step ends at %.17g, after the stop time %.17g.", name, function,
+                               target, run->stop_time);
     return ANSWER_OK;
 }
 
 Answer instance_step(void *handle, const char *function, double point, double size, EventPolicy policy,
                      StepReport *report)
 {
-    Instance *instance = enter(handle, function, MODE_STEP);
+    Instance *instance = instance_enter(handle, function, MODE_STEP);
     double target = point + size;
     *report = (StepReport){.reached = instance ? instance->run->time : 0.0};
     if (!instance || check_step(instance, function, point, size, target) != ANSWER_OK)
@@ -56,7 +58,7 @@ Answer instance_step(void *handle, const char *function, double point, double si
     if (report->terminate) {
         report->event = false;
         run->end_reported = true;
-        refuse(instance, "%s: %s", instance->name, engine_message(engine));
+        instance_refuse(instance, "%s: %s", instance->name, engine_message(engine));
     }
     /* The call itself succeeded: it computed what there is, and says by its flags that it is the end. */
     return ANSWER_OK;

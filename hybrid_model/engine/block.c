@@ -1,80 +1,9 @@
 /* The memory of an engine: the block that evolves, the scratch beside it, and messages. */
 #include <math.h>
-#include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "parts.h"
-
-void end_text_cleanly(char *text)
-{
-    size_t size = strlen(text), tail = 0;
-    while (tail < size && tail < 3 && ((unsigned char)text[size - 1 - tail] & 0xC0) == 0x80)
-        tail++;
-    if (tail == size)
-        return;
-    unsigned char lead = (unsigned char)text[size - 1 - tail];
-    size_t wanted = lead >= 0xF0 ? 3 : lead >= 0xE0 ? 2 : lead >= 0xC0 ? 1 : 0;
-    if (wanted > tail)
-        text[size - 1 - tail] = '\0';
-}
-
-bool problem(Engine *engine, Ending ending, const char *format, ...)
-{
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(engine->problem_message, sizeof engine->problem_message, format, arguments);
-    va_end(arguments);
-    end_text_cleanly(engine->problem_message);
-    engine->problem = ending;
-    return false;
-}
-
-/* The run is over for the reason noted last. */
-bool end_run(Engine *engine)
-{
-    engine->status->ending = (int32_t)engine->problem;
-    memcpy(engine->status->message, engine->problem_message, sizeof engine->problem_message);
-    return false;
-}
-
-const char *engine_name(const char *names, ModelName name, char text[NAME_SIZE])
-{
-    snprintf(text, NAME_SIZE, "%s%s", names + name.head, names + name.tail);
-    end_text_cleanly(text);
-    return text;
-}
-
-ModelName state_name(const Model *m, size_t i)
-{
-    return i < m->n_states ? m->state_names[i] : m->discrete_names[i - m->n_states];
-}
-
-const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size)
-{
-    const Model *m = engine->model;
-    size_t used = 0;
-    text[0] = '\0';
-    for (size_t i = 0; i < m->n_states + m->n_discrete && used + 1 < size; i++) {
-        double value = i < m->n_states ? x[i] : z[i - m->n_states];
-        int added = snprintf(text + used, size - used, "%s%s = %.10g", used ? ", " : "",
-                             NAME_AT(m->names, state_name(m, i)), value);
-        used += added > 0 ? (size_t)added : 0;
-    }
-    end_text_cleanly(text);
-    return text;
-}
-
-const char *engine_message(const Engine *engine)
-{
-    return engine->status->message;
-}
-
-const char *engine_problem(const Engine *engine)
-{
-    return engine->problem_message;
-}
 
 /* Hands out pieces of one allocation; without memory it only counts. */
 typedef struct {
@@ -122,7 +51,7 @@ static size_t lay_out_block(Engine *engine, unsigned char *memory)
     return cursor.used;
 }
 
-size_t seed_count(const Model *m)
+size_t engine_seed_count(const Model *m)
 {
     return 1 + 3 * m->n_states + 2 * m->n_discrete + m->n_inputs + m->n_parameters + m->n_outputs;
 }
@@ -153,9 +82,9 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     engine->rates = take(&cursor, vector);
     engine->indicators = take(&cursor, rows * sizeof(double));
     engine->slopes = take(&cursor, 2 * (m->n_states + m->n_outputs) * sizeof(double));
-    engine->unit = take(&cursor, seed_count(m) * sizeof(double));
+    engine->unit = take(&cursor, engine_seed_count(m) * sizeof(double));
     for (size_t i = 0; i < 2; i++)
-        engine->seeds[i] = take(&cursor, seed_count(m) * sizeof(double));
+        engine->seeds[i] = take(&cursor, engine_seed_count(m) * sizeof(double));
     engine->is_guard = take(&cursor, rows);
     engine->reset = take_point(&cursor, m);
     engine->shown = take_point(&cursor, m);
@@ -199,15 +128,15 @@ void *engine_wrapper(Engine *engine)
     return engine->wrapper;
 }
 
-void copy_values(double *to, const double *from, size_t n)
+void engine_copy(double *to, const double *from, size_t n)
 {
     if (n > 0)
         memcpy(to, from, n * sizeof(double));
 }
 
-void copy_point(const Engine *engine, const Point *from, const Point *to)
+void engine_copy_point(const Engine *engine, const Point *from, const Point *to)
 {
-    copy_values(to->time, from->time, point_length(engine->model));
+    engine_copy(to->time, from->time, point_length(engine->model));
 }
 
 void engine_reset(Engine *engine)
@@ -216,12 +145,12 @@ void engine_reset(Engine *engine)
     memset(engine->block, 0, engine->block_size);
     engine->status->relative_tolerance = RELATIVE_TOLERANCE;
     engine->status->stop_time = INFINITY;
-    copy_values(engine->live.x, m->x, m->n_states);
-    copy_values(engine->live.z, m->z, m->n_discrete);
-    copy_values(engine->u, m->u, m->n_inputs);
-    copy_values(engine->p, m->p, m->n_parameters);
+    engine_copy(engine->live.x, m->x, m->n_states);
+    engine_copy(engine->live.z, m->z, m->n_discrete);
+    engine_copy(engine->u, m->u, m->n_inputs);
+    engine_copy(engine->p, m->p, m->n_parameters);
     engine->view = VIEW_NONE;
-    problem(engine, ENDED_NOT, "%s", "");
+    engine_fail(engine, ENDED_NOT, "%s", "");
 }
 
 size_t engine_block_size(const Engine *engine)
@@ -267,8 +196,8 @@ static bool point_is_sound(const Model *m, const Point *point)
 static bool segment_is_sound(const Engine *engine)
 {
     const Status *status = engine->status;
-    bool sound = isfinite(status->segment_begin) && isfinite(status->segment_end) &&
-                 status->segment_begin < status->segment_end;
+    bool sound =
+        isfinite(status->segment_begin) && isfinite(status->segment_end) && status->segment_begin < status->segment_end;
     for (size_t i = 0; i < N_SEGMENT; i++)
         sound = sound && all_finite(engine->segment[i], engine->model->n_states);
     return sound || !status->has_segment;
@@ -280,16 +209,15 @@ bool engine_block_is_sound(const Engine *engine, void *block)
     Engine other = *engine;
     lay_out_block(&other, block);
     const Status *status = other.status;
-    bool sound = status->ending >= ENDED_NOT && status->ending <= ENDED_FAILED &&
-                 status->prediction >= PREDICTION_NONE && status->prediction <= PREDICTION_QUIET &&
-                 memchr(status->message, '\0', sizeof status->message) != NULL &&
-                 status->relative_tolerance >= RELATIVE_TOLERANCE &&
-                 status->relative_tolerance <= RELATIVE_TOLERANCE_MOST && isfinite(status->start_time) &&
-                 status->floor >= 0.0 && isfinite(status->floor) &&
-                 !isnan(status->stop_time) && isfinite(status->jumps_time);
+    bool sound =
+        status->ending >= ENDED_NOT && status->ending <= ENDED_FAILED && status->prediction >= PREDICTION_NONE &&
+        status->prediction <= PREDICTION_QUIET && memchr(status->message, '\0', sizeof status->message) != NULL &&
+        status->relative_tolerance >= RELATIVE_TOLERANCE && status->relative_tolerance <= RELATIVE_TOLERANCE_MOST &&
+        isfinite(status->start_time) && status->floor >= 0.0 && isfinite(status->floor) && !isnan(status->stop_time) &&
+        isfinite(status->jumps_time);
     for (size_t j = 0; j < m->n_jumps; j++)
         sound = sound && other.history[j].stored <= N_ZENO_TIMES;
     return sound && point_is_sound(m, &other.live) && point_is_sound(m, &other.predicted) &&
-           all_finite(other.u, m->n_inputs) && all_finite(other.p, m->n_parameters) && all_finite(other.inner_rates, m->n_states) &&
-           segment_is_sound(&other);
+           all_finite(other.u, m->n_inputs) && all_finite(other.p, m->n_parameters) &&
+           all_finite(other.inner_rates, m->n_states) && segment_is_sound(&other);
 }

@@ -32,7 +32,7 @@ static double step_along(const Engine *engine, double *const direction[MODEL_N_A
     for (size_t bank = 0; bank < MODEL_N_ARG; bank++)
         for (size_t i = 0; i < length_of(engine->model, bank); i++) {
             double value = fabs(value_of(engine, bank)[i]), seed = fabs(direction[bank][i]);
-            double size = bank == 1 ? state_size(engine, &engine->shown, i, value) : value;
+            double size = bank == 1 ? engine_state_size(engine, &engine->shown, i, value) : value;
             if (seed > 0.0)
                 step = fmin(step, MOVE * (size > 0.0 ? size : 1.0) / seed);
         }
@@ -93,7 +93,7 @@ static bool values_here(Engine *engine, const double **rates, const double **out
     return *rates && *outputs;
 }
 
-bool mend_slopes(Engine *engine, double *const direction[MODEL_N_ARG], double *rates, double *outputs)
+bool engine_mend_slopes(Engine *engine, double *const direction[MODEL_N_ARG], double *rates, double *outputs)
 {
     const Model *m = engine->model;
     const double *rates_here, *outputs_here;
@@ -129,7 +129,7 @@ static double weighted_slopes(const Engine *engine, double *const seeds[N_SEEDS]
     return sum;
 }
 
-bool mend_sensitivities(Engine *engine, double *const seeds[N_SEEDS])
+bool engine_mend_sensitivities(Engine *engine, double *const seeds[N_SEEDS])
 {
     const Model *m = engine->model;
     const double *rates, *outputs;
@@ -142,7 +142,7 @@ bool mend_sensitivities(Engine *engine, double *const seeds[N_SEEDS])
     if (!values_here(engine, &rates, &outputs))
         return false;
     double *unit = engine->unit;
-    memset(unit, 0, seed_count(m) * sizeof(double));
+    memset(unit, 0, engine_seed_count(m) * sizeof(double));
     for (size_t bank = 0, at = 0; bank < MODEL_N_ARG; at += length_of(m, bank++))
         direction[bank] = unit + at;
     for (size_t bank = 0; bank < MODEL_N_ARG; bank++)

@@ -149,10 +149,10 @@ const char *engine_message(const Engine *engine);
 const char *engine_problem(const Engine *engine);
 
 /* Drops what truncation left of a UTF-8 character at the end of a text. */
-void end_text_cleanly(char *text);
+void engine_end_text(char *text);
 
 /* The distance from |t| to the next larger double. */
-double time_ulp(double t);
+double engine_time_ulp(double t);
 
 #if defined(__GNUC__)
 #pragma GCC visibility pop

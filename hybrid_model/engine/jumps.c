@@ -1,6 +1,5 @@
 /* Jumps: which one is enabled, what it does, and how many there may be. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "parts.h"
@@ -25,12 +24,13 @@ static bool refused(Engine *engine, Ending ending, size_t jump, size_t i, double
 {
     const Model *m = engine->model;
     bool starts = jump == m->n_jumps;
-    return problem(engine, ending, "'%s' becomes %.9g at t = %.17g by %s%s%s; %s", NAME_AT(m->names, state_name(m, i)),
-                   engine->reset.x[i], t, starts ? "its start value" : "the jump map of '",
-                   starts ? "" : NAME_AT(m->names, m->jumps[jump].name), starts ? "" : "'", rule);
+    return engine_fail(engine, ending, "'%s' becomes %.9g at t = %.17g by %s%s%s; %s",
+                       NAME_AT(m->names, engine_state_name(m, i)), engine->reset.x[i], t,
+                       starts ? "its start value" : "the jump map of '",
+                       starts ? "" : NAME_AT(m->names, m->jumps[jump].name), starts ? "" : "'", rule);
 }
 
-bool accept_state(Engine *engine, size_t jump, const Point *point)
+bool engine_accept_state(Engine *engine, size_t jump, const Point *point)
 {
     const Model *m = engine->model;
     for (size_t i = 0; i < m->n_states + m->n_discrete; i++)
@@ -41,8 +41,8 @@ bool accept_state(Engine *engine, size_t jump, const Point *point)
         if (m->whole[i] && engine->reset.z[i] != floor(engine->reset.z[i]))
             return refused(engine, ENDED_FAILED, jump, m->n_states + i, *point->time,
                            "it is declared integer and must stay a whole number. Remedy: round it in that map.");
-    copy_values(point->x, engine->reset.x, m->n_states + m->n_discrete);
-    note_sizes(engine, point);
+    engine_copy(point->x, engine->reset.x, m->n_states + m->n_discrete);
+    engine_note_sizes(engine, point);
     *point->step = 0.0;
     return true;
 }
@@ -59,43 +59,44 @@ static bool evaluate_reset(Engine *engine, size_t jump, const Point *point)
     return engine->model->reset(jump, engine->arg, engine->res, engine->iw, engine->w) == 0;
 }
 
-bool evaluate_times(Engine *engine, const Point *point)
+bool engine_evaluate_times(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
     if (m->n_times == 0)
         return true;
-    if (!evaluate(engine, m->times, *point->time, point->x, point->z, engine->times, NULL))
-        return problem(engine, ENDED_FAILED, "The event times of '%s' could not be evaluated at t = %.17g.", m->name,
-                       *point->time);
+    if (!engine_evaluate(engine, m->times, *point->time, point->x, point->z, engine->times, NULL))
+        return engine_fail(engine, ENDED_FAILED, "The event times of '%s' could not be evaluated at t = %.17g.",
+                           m->name, *point->time);
     for (size_t j = 0; j < m->n_jumps; j++)
         if (m->jumps[j].kind == JUMP_ON_TIME && isnan(engine->times[m->jumps[j].index]))
-            return problem(engine, ENDED_NOT_FINITE,
-                           "The time of '%s' is not a number at t = %.17g; a time event needs a time (infinity: "
-                           "never). Remedy: check its expression and the parameters.",
-                           NAME_AT(m->names, m->jumps[j].name), *point->time);
+            return engine_fail(engine, ENDED_NOT_FINITE,
+                               "The time of '%s' is not a number at t = %.17g; a time event needs a time (infinity: "
+                               "never). Remedy: check its expression and the parameters.",
+                               NAME_AT(m->names, m->jumps[j].name), *point->time);
     return true;
 }
 
 /* The jump of a time event must move its time on, though not yet past the present. */
 static bool moved_on(Engine *engine, size_t jump, double was, const Point *point)
 {
-    if (!evaluate_times(engine, point))
+    if (!engine_evaluate_times(engine, point))
         return false;
     double now = engine->times[engine->model->jumps[jump].index];
-    return now > was || problem(engine, ENDED_FAILED,
-                                "The time event '%s' was due at %.17g s and after its jump is due at %.17g s. Remedy: "
-                                "let its jump map move its time on.",
-                                NAME_AT(engine->model->names, engine->model->jumps[jump].name), was, now);
+    return now > was ||
+           engine_fail(engine, ENDED_FAILED,
+                       "The time event '%s' was due at %.17g s and after its jump is due at %.17g s. Remedy: "
+                       "let its jump map move its time on.",
+                       NAME_AT(engine->model->names, engine->model->jumps[jump].name), was, now);
 }
 
-bool apply_reset(Engine *engine, size_t jump, const Point *point)
+bool engine_apply_reset(Engine *engine, size_t jump, const Point *point)
 {
     const ModelJump *entry = &engine->model->jumps[jump];
     double was = entry->kind == JUMP_ON_TIME ? engine->times[entry->index] : 0.0;
     if (!evaluate_reset(engine, jump, point))
-        return problem(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
-                       NAME_AT(engine->model->names, entry->name), *point->time);
-    return accept_state(engine, jump, point) &&
+        return engine_fail(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
+                           NAME_AT(engine->model->names, entry->name), *point->time);
+    return engine_accept_state(engine, jump, point) &&
            (entry->kind == JUMP_ON_STATE || moved_on(engine, jump, was, point));
 }
 
@@ -112,17 +113,17 @@ static size_t first_internal(const Engine *engine, const Point *point)
 
 /* Takes the breakpoints that are due, up to the first visible jump in the order of the table: a jump
    of the same instant that comes before a breakpoint sees the state before it. */
-bool take_internal_jumps(Engine *engine, const Point *point)
+bool engine_take_internal_jumps(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
     size_t n = m->n_jumps, visible, last = n, repeats = 0, all = 0;
     for (;;) {
-        if (!evaluate_times(engine, point))
+        if (!engine_evaluate_times(engine, point))
             return false;
         size_t internal = first_internal(engine, point);
         if (internal == n)
             return true;
-        if (!first_enabled(engine, point, &visible))
+        if (!engine_first_enabled(engine, point, &visible))
             return false;
         if (visible < internal)
             return true;
@@ -130,8 +131,8 @@ bool take_internal_jumps(Engine *engine, const Point *point)
         last = internal;
         /* Those that enable each other in turn have an end as well. */
         if ((double)repeats > m->scales.jumps_at_once || (double)++all > m->scales.jumps_at_once * (double)m->n_times)
-            return too_many_at_once(engine, internal, repeats > 1 ? repeats : all, *point->time);
-        if (!apply_reset(engine, internal, point))
+            return engine_too_many_at_once(engine, internal, repeats > 1 ? repeats : all, *point->time);
+        if (!engine_apply_reset(engine, internal, point))
             return false;
     }
 }
@@ -144,22 +145,22 @@ static bool flow_is_over(Engine *engine, const Point *point, bool *over)
     *over = false;
     if (!engine->model->has_flow_set)
         return true;
-    if (!evaluate_flow_set(engine, *point->time, point->x, point->z, &margin))
+    if (!engine_evaluate_flow_set(engine, *point->time, point->x, point->z, &margin))
         return false;
     if (margin > point->level[engine->model->n_margins])
         return true;
-    *over = margin < -flow_border(engine, point, *point->time, point->x);
+    *over = margin < -engine_flow_border(engine, point, *point->time, point->x);
     /* On the border, up to rounding, it depends on where the flow leads. */
-    return *over || (step_begin(engine, point) && leads_out(engine, point, margin, over));
+    return *over || (engine_step_begin(engine, point) && engine_leads_out(engine, point, margin, over));
 }
 
 /* The first enabled visible jump at the point, n_jumps if there is none. */
-bool first_enabled(Engine *engine, const Point *point, size_t *jump)
+bool engine_first_enabled(Engine *engine, const Point *point, size_t *jump)
 {
     const Model *m = engine->model;
     bool open = !m->flow_priority, asked = open;
     *jump = m->n_jumps;
-    if (!evaluate_times(engine, point) || !evaluate_margins(engine, *point->time, point->x, point->z))
+    if (!engine_evaluate_times(engine, point) || !engine_evaluate_margins(engine, *point->time, point->x, point->z))
         return false;
     for (size_t j = 0; j < m->n_jumps; j++) {
         const ModelJump *entry = &m->jumps[j];
@@ -183,36 +184,38 @@ static bool count_jump(Engine *engine, size_t jump)
 {
     engine->status->jumps_time = *engine->live.time;
     engine->status->jumps_taken++;
-    return zeno_record(engine, jump);
+    return engine_zeno_record(engine, jump);
 }
 
 static bool take_jump(Engine *engine, size_t jump)
 {
-    changed(engine);
-    if (!apply_reset(engine, jump, &engine->live) || !take_internal_jumps(engine, &engine->live))
-        return end_run(engine);
+    engine_changed(engine);
+    if (!engine_apply_reset(engine, jump, &engine->live) || !engine_take_internal_jumps(engine, &engine->live))
+        return engine_end_run(engine);
     if (engine->model->jumps[jump].kind == JUMP_ON_STATE)
         engine->live.level[engine->model->jumps[jump].index] = 0.0;
     engine->live.level[engine->model->n_margins] = 0.0;
     engine->ticked[jump] = 1;
     if (engine->jump_hook)
         engine->jump_hook(engine->jump_context, *engine->live.time, jump);
-    return count_jump(engine, jump) || end_run(engine);
+    return count_jump(engine, jump) || engine_end_run(engine);
 }
 
 bool engine_start(Engine *engine)
 {
-    changed(engine);
-    if (!evaluate(engine, engine->model->start, *engine->live.time, engine->live.x, engine->live.z, engine->reset.x,
-                  engine->reset.z))
-        return problem(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.", engine->model->name);
-    return accept_state(engine, engine->model->n_jumps, &engine->live) && take_internal_jumps(engine, &engine->live);
+    engine_changed(engine);
+    if (!engine_evaluate(engine, engine->model->start, *engine->live.time, engine->live.x, engine->live.z,
+                         engine->reset.x, engine->reset.z))
+        return engine_fail(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.",
+                           engine->model->name);
+    return engine_accept_state(engine, engine->model->n_jumps, &engine->live) &&
+           engine_take_internal_jumps(engine, &engine->live);
 }
 
 size_t engine_pending(Engine *engine)
 {
     size_t jump;
-    if (engine->status->ending != ENDED_NOT || !first_enabled(engine, &engine->live, &jump))
+    if (engine->status->ending != ENDED_NOT || !engine_first_enabled(engine, &engine->live, &jump))
         return engine->model->n_jumps;
     return jump;
 }
@@ -223,11 +226,11 @@ bool engine_jump(Engine *engine, bool *states_changed)
     *states_changed = false;
     if (engine->status->ending != ENDED_NOT)
         return false;
-    if (!take_internal_jumps(engine, &engine->live) || !first_enabled(engine, &engine->live, &jump))
-        return end_run(engine);
+    if (!engine_take_internal_jumps(engine, &engine->live) || !engine_first_enabled(engine, &engine->live, &jump))
+        return engine_end_run(engine);
     if (jump == engine->model->n_jumps)
         return true;
-    copy_values(engine->dense_x, engine->live.x, n);
+    engine_copy(engine->dense_x, engine->live.x, n);
     bool taken = take_jump(engine, jump);
     for (size_t i = 0; i < n; i++)
         *states_changed = *states_changed || engine->dense_x[i] != engine->live.x[i];
@@ -238,8 +241,8 @@ bool engine_jump_all(Engine *engine)
 {
     while (engine->status->ending == ENDED_NOT) {
         size_t jump;
-        if (!take_internal_jumps(engine, &engine->live) || !first_enabled(engine, &engine->live, &jump))
-            return end_run(engine);
+        if (!engine_take_internal_jumps(engine, &engine->live) || !engine_first_enabled(engine, &engine->live, &jump))
+            return engine_end_run(engine);
         if (jump == engine->model->n_jumps)
             return true;
         take_jump(engine, jump);

@@ -11,6 +11,12 @@
 /* So many instants before an event an importer may stop. */
 #define IMPORTER_INSTANTS 50.0
 
+static Search search_at(Engine *engine, const Point *point, double level, double piece_end)
+{
+    size_t n = engine->model->n_margins;
+    return (Search){engine, point, level, piece_end, .n_rows = n + 1, .exit_row = n};
+}
+
 /* The time within one instant after `from` at which guards that are negative there cross, the
    first or the last of them.  `from` itself if there is none. */
 static double crossing_soon_after(Search *search, double from, bool want_first)
@@ -18,15 +24,15 @@ static double crossing_soon_after(Search *search, double from, bool want_first)
     Engine *engine = search->engine;
     const Model *m = engine->model;
     double end = fmin(search->piece_end, engine->status->stop_time);
-    double until = fmin(from + one_instant(engine, from), end), chosen = from;
+    double until = fmin(from + engine_one_instant(engine, from), end), chosen = from;
     double *now = engine->samples, *then = engine->samples + search->n_rows;
-    if (until <= from || !look(search, ON_STEP, from, now) || !try_to_look(search, ON_STEP, until, then))
+    if (until <= from || !engine_look(search, ON_STEP, from, now) || !engine_try_to_look(search, ON_STEP, until, then))
         return from;
     for (size_t row = 0; row < m->n_margins && !search->failed; row++) {
         if (!engine->is_guard[row] || now[row] >= 0.0 || then[row] < 0.0)
             continue;
         Bracket bracket = {from, now[row], until, then[row]};
-        polish(search, row, &bracket);
+        engine_refine_bracket(search, row, &bracket);
         if (chosen == from || (want_first ? bracket.b < chosen : bracket.b > chosen))
             chosen = bracket.b;
     }
@@ -39,7 +45,8 @@ static double common_time(Search *search, double first)
     Engine *engine = search->engine;
     double latest = crossing_soon_after(search, first, false);
     double *now = engine->samples, *then = engine->samples + search->n_rows;
-    if (latest == first || search->failed || !look(search, ON_STEP, first, now) || !look(search, ON_STEP, latest, then))
+    if (latest == first || search->failed || !engine_look(search, ON_STEP, first, now) ||
+        !engine_look(search, ON_STEP, latest, then))
         return first;
     for (size_t row = 0; row < engine->model->n_margins; row++)
         if (engine->is_guard[row] && now[row] >= 0.0 && then[row] < 0.0)
@@ -51,13 +58,13 @@ static FlowEnd move_to(Search *search, double t)
 {
     Engine *engine = search->engine;
     const Point *point = search->point;
-    if (!step_probe(engine, point, t))
+    if (!engine_step_probe(engine, point, t))
         return FLOW_PROBLEM;
     *point->time = t;
     *point->step = 0.0;
     for (size_t i = 0; i < engine->model->n_states; i++)
         point->x[i] = engine->probe_x[i];
-    note_sizes(engine, point);
+    engine_note_sizes(engine, point);
     return FLOW_EVENT;
 }
 
@@ -68,7 +75,7 @@ static FlowEnd leave_flow_set(Search *search, double t)
     const Point *point = search->point;
     double *rows = engine->samples, margin, when = t;
     bool enabled = false;
-    if (!look(search, ON_STEP, t, rows))
+    if (!engine_look(search, ON_STEP, t, rows))
         return FLOW_PROBLEM;
     for (size_t row = 0; row < engine->model->n_margins; row++)
         enabled = enabled || (engine->is_guard[row] && rows[row] >= 0.0);
@@ -78,12 +85,13 @@ static FlowEnd leave_flow_set(Search *search, double t)
         return FLOW_PROBLEM;
     if (enabled || when > t)
         return move_to(search, common_time(search, when));
-    double crossing = last_inside(search, t);
+    double crossing = engine_last_inside(search, t);
     if (isfinite(crossing))
         t = crossing;
-    if (search->failed || move_to(search, t) == FLOW_PROBLEM || !evaluate_flow_set(engine, t, point->x, point->z, &margin))
+    if (search->failed || move_to(search, t) == FLOW_PROBLEM ||
+        !engine_evaluate_flow_set(engine, t, point->x, point->z, &margin))
         return FLOW_PROBLEM;
-    blocked(engine, t, point->x, point->z, margin);
+    engine_blocked(engine, t, point->x, point->z, margin);
     return FLOW_PROBLEM;
 }
 
@@ -96,23 +104,23 @@ static bool look_one_instant_on(Engine *engine, const Point *point, double t, co
     double soon = fmin(t + ahead, engine->status->stop_time);
     double before = fmax(t - (t + ahead - soon), engine->status->start_time);
     double *rates = engine->probe_k[1], *moved = engine->dense_x;
-    if (m->n_states > 0 && !evaluate(engine, m->flow, t, x, point->z, rates, NULL))
+    if (m->n_states > 0 && !engine_evaluate(engine, m->flow, t, x, point->z, rates, NULL))
         return false;
     for (size_t i = 0; i < m->n_states; i++) {
         moved[i] = x[i] + ahead * rates[i];
         if (!isfinite(moved[i]))
             return false;
     }
-    if (!evaluate_margins(engine, soon, moved, point->z))
+    if (!engine_evaluate_margins(engine, soon, moved, point->z))
         return false;
-    copy_values(then, engine->margins, m->n_margins);
+    engine_copy(then, engine->margins, m->n_margins);
     if (soon >= t + ahead || !(before < t))
         return true;
-    if (!evaluate_margins(engine, t, x, point->z))
+    if (!engine_evaluate_margins(engine, t, x, point->z))
         return false;
     for (size_t i = 0; i < m->n_margins; i++)
         then[i] += engine->margins[i];
-    if (!evaluate_margins(engine, before, x, point->z))
+    if (!engine_evaluate_margins(engine, before, x, point->z))
         return false;
     for (size_t i = 0; i < m->n_margins; i++)
         then[i] -= engine->margins[i];
@@ -123,13 +131,12 @@ static bool look_one_instant_on(Engine *engine, const Point *point, double t, co
 static bool raise_guards(Engine *engine, const Point *point, double t, double ahead)
 {
     const Model *m = engine->model;
-    Search search = {.engine = engine, .point = point, .level = 0.0, .piece_end = t,
-                     .n_rows = m->n_margins + 1, .exit_row = m->n_margins, .failed = false};
+    Search search = search_at(engine, point, 0.0, t);
     const Step *step = &engine->step;
     double *now = engine->samples, *then = engine->samples + search.n_rows;
     if (m->n_margins == 0)
         return true;
-    if (!look(&search, ON_STEP, t, now))
+    if (!engine_look(&search, ON_STEP, t, now))
         return false;
     const double *x = t == step->t0 ? step->x0 : t == step->t1 ? step->x1 : engine->probe_x;
     if (!look_one_instant_on(engine, point, t, x, ahead, then))
@@ -140,47 +147,49 @@ static bool raise_guards(Engine *engine, const Point *point, double t, double ah
     return true;
 }
 
-bool raise_levels(Engine *engine, const Point *point, double t)
+bool engine_raise_levels(Engine *engine, const Point *point, double t)
 {
-    return engine->model->flow_priority || raise_guards(engine, point, t, one_instant(engine, t));
+    return engine->model->flow_priority || raise_guards(engine, point, t, engine_one_instant(engine, t));
 }
 
-bool raise_levels_here(Engine *engine, const Point *point)
+bool engine_raise_levels_here(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
     /* An importer that integrates by itself locates less finely. */
-    double now, t = *point->time, ahead = IMPORTER_INSTANTS * one_instant(engine, t), earlier = fmax(t - ahead, engine->status->start_time);
-    note_sizes(engine, point);
+    double now, t = *point->time, ahead = IMPORTER_INSTANTS * engine_one_instant(engine, t);
+    double earlier = fmax(t - ahead, engine->status->start_time);
+    engine_note_sizes(engine, point);
     /* An importer may locate an event a little behind its guard, where the flow map need not be defined. */
-    if (!step_begin(engine, point))
+    if (!engine_step_begin(engine, point))
         return true;
     if (!raise_guards(engine, point, t, ahead))
         return false;
     if (!m->flow_priority || !m->has_flow_set)
         return true;
-    if (!evaluate_flow_set(engine, t, point->x, point->z, &now))
+    if (!engine_evaluate_flow_set(engine, t, point->x, point->z, &now))
         return false;
     double before = now;
-    if (earlier < t && step_probe(engine, point, earlier) &&
-        evaluate(engine, m->flow_set, earlier, engine->probe_x, point->z, &before, NULL) && now > 0.0 &&
+    if (earlier < t && engine_step_probe(engine, point, earlier) &&
+        engine_evaluate(engine, m->flow_set, earlier, engine->probe_x, point->z, &before, NULL) && now > 0.0 &&
         now + (now - before) * ahead / (t - earlier) < 0.0)
         point->level[m->n_margins] = now;
     return true;
 }
 
-bool reach_guard(Engine *engine, const Point *point, double limit)
+bool engine_reach_guard(Engine *engine, const Point *point, double limit)
 {
     const Model *m = engine->model;
-    double t = *point->time, ahead = one_instant(engine, t), earlier = fmax(t - ahead, engine->status->start_time);
-    double wait = fmin(m->scales.overshoot * time_ulp(t), limit - t), *now = engine->samples;
+    double t = *point->time, ahead = engine_one_instant(engine, t);
+    double earlier = fmax(t - ahead, engine->status->start_time);
+    double wait = fmin(m->scales.overshoot * engine_time_ulp(t), limit - t), *now = engine->samples;
     const double *rates = engine->step.k[0];
     size_t nearest = m->n_margins;
-    if (m->flow_priority || !(earlier < t) || !evaluate_margins(engine, t, point->x, point->z))
+    if (m->flow_priority || !(earlier < t) || !engine_evaluate_margins(engine, t, point->x, point->z))
         return false;
-    copy_values(now, engine->margins, m->n_margins);
+    engine_copy(now, engine->margins, m->n_margins);
     for (size_t i = 0; i < m->n_states; i++)
         engine->probe_x[i] = point->x[i] - (t - earlier) * rates[i];
-    if (!evaluate_margins(engine, earlier, engine->probe_x, point->z))
+    if (!engine_evaluate_margins(engine, earlier, engine->probe_x, point->z))
         return false;
     for (size_t row = 0; row < m->n_margins; row++) {
         double slope = (now[row] - engine->margins[row]) / (t - earlier);
@@ -195,10 +204,10 @@ bool reach_guard(Engine *engine, const Point *point, double limit)
     for (size_t i = 0; i < m->n_states; i++)
         point->x[i] += (*point->time - t) * rates[i];
     *point->step = 0.0;
-    note_sizes(engine, point);
-    if (!evaluate_margins(engine, *point->time, point->x, point->z))
+    engine_note_sizes(engine, point);
+    if (!engine_evaluate_margins(engine, *point->time, point->x, point->z))
         return false;
-    clear_levels(engine, point);
+    engine_clear_levels(engine, point);
     point->level[nearest] = fmin(0.0, engine->margins[nearest]);
     return true;
 }
@@ -210,42 +219,43 @@ static bool refuse_indicators(Engine *engine, const Search *search)
     for (size_t row = 0; row < search->n_rows - !m->has_flow_set; row++) {
         size_t zeros = 0, ones = 0;
         for (size_t i = 0; i < N_SAMPLES && zeros + ones == i; i++) {
-            double margin = row == search->exit_row ? -sample(search, i, row) : sample(search, i, row);
+            double margin = row == search->exit_row ? -engine_sample(search, i, row) : engine_sample(search, i, row);
             zeros += margin == 0.0 || margin == DBL_MIN;
             ones += margin == 1.0;
         }
         if (zeros > 0 && ones > 0 && zeros + ones == N_SAMPLES)
-            return problem(engine, ENDED_FAILED,
-                           "The margin of %s'%s' is 0 or 1 along the flow up to t = %.17g, as if it said no or yes. "
-                           "Remedy: return a number that is zero or above inside the set and negative outside.",
-                           row == search->exit_row ? "the flow set of " : "jump ",
-                           row == search->exit_row ? m->name : NAME_AT(m->names, m->margin_names[row]), engine->step.t1);
+            return engine_fail(
+                engine, ENDED_FAILED,
+                "The margin of %s'%s' is 0 or 1 along the flow up to t = %.17g, as if it said no or yes. "
+                "Remedy: return a number that is zero or above inside the set and negative outside.",
+                row == search->exit_row ? "the flow set of " : "jump ",
+                row == search->exit_row ? m->name : NAME_AT(m->names, m->margin_names[row]), engine->step.t1);
     }
     return true;
 }
 
-FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end)
+FlowEnd engine_locate_event(Engine *engine, const Point *point, double level, double piece_end)
 {
     const Model *m = engine->model;
-    Search search = {.engine = engine, .point = point, .level = level, .piece_end = piece_end,
-                     .n_rows = m->n_margins + 1, .exit_row = m->n_margins, .failed = false};
+    Search search = search_at(engine, point, level, piece_end);
     if (m->n_margins == 0 && !m->has_flow_set)
         return FLOW_REACHED;
     for (size_t i = 0; i < N_SAMPLES; i++) {
-        double t = sample_time(engine->step.t0, engine->step.t1, i);
-        if (!look(&search, ON_INTERPOLATION, t, engine->samples + i * search.n_rows))
+        double t = engine_sample_time(engine->step.t0, engine->step.t1, i);
+        if (!engine_look(&search, ON_INTERPOLATION, t, engine->samples + i * search.n_rows))
             return FLOW_PROBLEM;
     }
     if (!refuse_indicators(engine, &search))
         return FLOW_PROBLEM;
     double guard = INFINITY, leaving = INFINITY;
-    bool has_guard = first_guard(&search, &guard);
-    bool leaves = m->has_flow_set && !search.failed && first_exit(&search, &leaving);
+    bool has_guard = engine_first_guard(&search, &guard);
+    bool leaves = m->has_flow_set && !search.failed && engine_first_exit(&search, &leaving);
     if (search.failed)
         return FLOW_PROBLEM;
-    if (has_guard && (!leaves || guard <= leaving + one_instant(engine, leaving))) {
+    if (has_guard && (!leaves || guard <= leaving + engine_one_instant(engine, leaving))) {
         guard = common_time(&search, guard);
-        if (search.failed || (guard + one_instant(engine, guard) > piece_end && !raise_levels(engine, point, guard)))
+        if (search.failed ||
+            (guard + engine_one_instant(engine, guard) > piece_end && !engine_raise_levels(engine, point, guard)))
             return FLOW_PROBLEM;
         return move_to(&search, guard);
     }

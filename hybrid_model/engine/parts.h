@@ -33,8 +33,9 @@
 #define SEGMENT_PART 0.35
 
 /* A point of the run.  time, step, x, z, level and size lie one after the other in memory, so one copy
-   moves them all; size holds the largest value that each continuous state has had; step is the solver's proposal for the next step, 0 when there is none.  level is
-   the margin from which on each guard is enabled: 0, or slightly below where a flow ended so shortly
+   moves them all; size holds the largest value that each continuous state has had; step is the solver's
+   proposal for the next step, 0 when there is none.  level is the margin from which on each guard is
+   enabled: 0, or slightly below where a flow ended so shortly
    before the crossing that it counts as reached.  Its last entry is the margin of the flow set up to
    which, under flow priority, the state is on the border: 0, or slightly above for the same reason. */
 typedef struct {
@@ -129,114 +130,144 @@ struct Engine {
     char problem_message[MESSAGE_SIZE];
 };
 
-/* CHANGED: the hook has set an input or a nearer target. */
+/* Why a flow ended.  CHANGED: the hook has set an input or a nearer target. */
 typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_CHANGED, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
 
-/* block.c */
-/* Notes why something cannot be done; always false, so that callers can return it. */
-bool problem(Engine *engine, Ending ending, const char *format, ...) LIKE_PRINTF(3, 4);
-/* The run is over for the reason noted last; always false. */
-bool end_run(Engine *engine);
-void copy_values(double *to, const double *from, size_t n);
-void copy_point(const Engine *engine, const Point *from, const Point *to);
-/* The name of continuous state i, or from n_states on that of a discrete one. */
-ModelName state_name(const Model *m, size_t i);
-/* The values of a state for a message: "h = 0.1, v = -4.4". */
-const char *describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size);
+/* The files of the engine from the lowest to the highest: each calls functions of those before it only.  Those of
+   engine.h are in message.c, block.c, values.c, jumps.c, views.c, sensitivity.c (after differences.c), predict.c,
+   outside.c and engine.c, the last ones; samples.c, rises.c and crossings.c, before locate.c, are in search.h. */
 
+/* message.c */
+/* Notes why something cannot be done; always false, so that callers can return it. */
+bool engine_fail(Engine *engine, Ending ending, const char *format, ...) LIKE_PRINTF(3, 4);
+/* The run is over for the reason noted last; always false. */
+bool engine_end_run(Engine *engine);
+/* The name of continuous state i, or from n_states on that of a discrete one. */
+ModelName engine_state_name(const Model *m, size_t i);
+/* The values of a state for a message: "h = 0.1, v = -4.4". */
+const char *engine_describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size);
+
+/* block.c */
+void engine_copy(double *to, const double *from, size_t n);
+void engine_copy_point(const Engine *engine, const Point *from, const Point *to);
 /* The number of seeds in one of the engine's two places for them. */
-size_t seed_count(const Model *model);
+size_t engine_seed_count(const Model *model);
 
 /* values.c */
 /* Evaluates a function of the model at (t, x, z) with the present inputs and parameters. */
-bool evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
+bool engine_evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
               double *second);
-/* Computes the state that a view shows, into engine->shown, once. */
-bool hold_view(Engine *engine, View view);
+/* The rates of the states there; nothing to do without states. */
+bool engine_rates(Engine *engine, double t, const double *x, const double *z, double *result);
 /* The usual size of state i at a point whose value there is x. */
-double state_size(const Engine *engine, const Point *point, size_t i, double x);
+double engine_state_size(const Engine *engine, const Point *point, size_t i, double x);
 /* The largest state that the run has shown at the point, and at x. */
-double largest_state(const Engine *engine, const Point *point, const double *x);
+double engine_largest_state(const Engine *engine, const Point *point, const double *x);
 /* The point has got where it is: its states are among those that the run has shown. */
-void note_sizes(const Engine *engine, const Point *point);
+void engine_note_sizes(const Engine *engine, const Point *point);
 /* Guards are enabled from zero on. */
-void clear_levels(const Engine *engine, const Point *point);
+void engine_clear_levels(const Engine *engine, const Point *point);
 /* Something that the future depends on has changed. */
-void changed(Engine *engine);
+void engine_changed(Engine *engine);
+
+/* first_step.c */
+/* The length of a first step from the point towards `limit`; engine_step_begin comes before. */
+bool engine_first_step(Engine *engine, const Point *point, double limit, double *h);
+/* Gives states that are far below where a flow to `limit` may lead a size of that; whether they got one.
+   engine_step_begin comes before. */
+bool engine_raise_floor(Engine *engine, const Point *point, double limit);
+
+/* integrate.c */
+/* Evaluates the flow at the point into step->k[0]. */
+bool engine_step_begin(Engine *engine, const Point *point);
+/* One accepted step from the point towards `limit`, which it never passes; the result is in engine->step. */
+bool engine_step_accept(Engine *engine, const Point *point, double limit);
+/* The point takes the end of the step. */
+void engine_step_commit(Engine *engine, const Point *point);
+/* One step of the solver from the start of the present one to any time: engine->probe_x. */
+bool engine_step_probe(Engine *engine, const Point *point, double t);
+
+/* dense.c */
+/* The interpolation of the present step: engine->dense_x. */
+void engine_step_dense(Engine *engine, double t);
+/* Keeps the present step as a segment on which the live point moves. */
+void engine_segment_keep(Engine *engine);
+/* Moves the live point along the segment. */
+void engine_segment_read(Engine *engine, double t);
+
+/* sets.c */
+/* How far apart (s) crossings may be at `t` and still be one instant. */
+double engine_one_instant(const Engine *engine, double t);
+/* Margins of the jumps at (t, x); false if one is not a number. */
+bool engine_evaluate_margins(Engine *engine, double t, const double *x, const double *z);
+bool engine_evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin);
+/* By how much the margin of the flow set may be negative at a state of the present step that counts as inside. */
+double engine_flow_border(Engine *engine, const Point *point, double t, const double *x);
+/* Whether the flow leads out of the flow set from the point, which is on its border; engine_step_begin comes before. */
+bool engine_leads_out(Engine *engine, const Point *point, double margin, bool *out);
+/* Whether the point may flow as far as the flow set says; *level is the margin to be kept. */
+bool engine_flow_may_begin(Engine *engine, const Point *point, double *level);
+/* Notes that the state can neither flow nor jump; always false. */
+bool engine_blocked(Engine *engine, double t, const double *x, const double *z, double margin);
+
+/* zeno.c */
+/* Records a jump of the live point at its time; false if it is one too many. */
+bool engine_zeno_record(Engine *engine, size_t jump);
+/* Notes that a jump is taken at one instant for the `count`th time, which is once too often; always false. */
+bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t);
 
 /* jumps.c */
 /* Copies the new state in engine->reset into the point if all of it is finite, and whole where it must be; it comes
    from a jump, or (n_jumps) from the start map. */
-bool accept_state(Engine *engine, size_t jump, const Point *point);
+bool engine_accept_state(Engine *engine, size_t jump, const Point *point);
 /* Takes a jump that is due at the point, for which the event times must be there; those afterwards are there then. */
-bool apply_reset(Engine *engine, size_t jump, const Point *point);
-bool evaluate_times(Engine *engine, const Point *point);
+bool engine_apply_reset(Engine *engine, size_t jump, const Point *point);
+bool engine_evaluate_times(Engine *engine, const Point *point);
 /* Takes the breakpoints of the flow that are due and come before any visible jump. */
-bool take_internal_jumps(Engine *engine, const Point *point);
+bool engine_take_internal_jumps(Engine *engine, const Point *point);
 /* The first enabled visible jump at the point, n_jumps if there is none. */
-bool first_enabled(Engine *engine, const Point *point, size_t *jump);
+bool engine_first_enabled(Engine *engine, const Point *point, size_t *jump);
 
-/* integrate.c */
-/* Evaluates the flow at the point into step->k[0]. */
-bool step_begin(Engine *engine, const Point *point);
-/* The length of a first step from the point towards `limit`; step_begin comes before. */
-bool first_step(Engine *engine, const Point *point, double limit, double *h);
-/* Gives states that are far below where a flow to `limit` may lead a size of that; whether they got one.
-   step_begin comes before. */
-bool raise_floor(Engine *engine, const Point *point, double limit);
-/* One accepted step from the point towards `limit`, which it never passes; the result is in engine->step. */
-bool step_accept(Engine *engine, const Point *point, double limit);
-/* The point takes the end of the step. */
-void step_commit(Engine *engine, const Point *point);
-/* One step of the solver from the start of the present one to any time: engine->probe_x. */
-bool step_probe(Engine *engine, const Point *point, double t);
-/* The interpolation of the present step: engine->dense_x. */
-void step_dense(Engine *engine, double t);
-/* Keeps the present step as a segment on which the live point moves. */
-void segment_keep(Engine *engine);
-/* Moves the live point along the segment. */
-void segment_read(Engine *engine, double t);
-
-/* sets.c */
-/* How far apart (s) crossings may be at `t` and still be one instant. */
-double one_instant(const Engine *engine, double t);
-/* By how much the margin of the flow set may be negative at a state of the present step that counts as inside. */
-double flow_border(Engine *engine, const Point *point, double t, const double *x);
-/* Whether the flow leads out of the flow set from the point, which is on its border; step_begin comes before. */
-bool leads_out(Engine *engine, const Point *point, double margin, bool *out);
-/* Margins of the jumps at (t, x); false if one is not a number. */
-bool evaluate_margins(Engine *engine, double t, const double *x, const double *z);
-bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin);
-/* Whether the point may flow as far as the flow set says; *level is the margin to be kept. */
-bool flow_may_begin(Engine *engine, const Point *point, double *level);
-/* Notes that the state can neither flow nor jump; always false. */
-bool blocked(Engine *engine, double t, const double *x, const double *z, double margin);
-
-/* locate.c */
-/* Looks for the first event on the present step; FLOW_EVENT moves the point there. */
-FlowEnd locate_event(Engine *engine, const Point *point, double level, double piece_end);
-/* Enables the guards that would cross within one instant after `t`, a time on or at the end of
-   the present step, if the flow could go on: neither a breakpoint nor the end of a run may hide a
-   crossing that rounding puts behind it. */
-bool raise_levels(Engine *engine, const Point *point, double t);
-/* The same for the point itself, and for the border of the flow set under flow priority. */
-bool raise_levels_here(Engine *engine, const Point *point);
-/* Goes straight on to a guard where the solver cannot, if it is as near as a solver comes; a flow map that is defined
-   up to a guard only, as a root is, stops it some ulp before. */
-bool reach_guard(Engine *engine, const Point *point, double limit);
+/* views.c */
+/* Computes the state that a view shows, into engine->shown, once. */
+bool engine_hold_view(Engine *engine, View view);
 
 /* differences.c */
 /* Puts difference quotients along a direction in the place of those of `rates` and `outputs` that are not numbers,
    where both sides agree on one. */
-bool mend_slopes(Engine *engine, double *const direction[MODEL_N_ARG], double *rates, double *outputs);
+bool engine_mend_slopes(Engine *engine, double *const direction[MODEL_N_ARG], double *rates, double *outputs);
 /* The same for the sensitivities in `seeds`, whose weights are there. */
-bool mend_sensitivities(Engine *engine, double *const seeds[N_SEEDS]);
+bool engine_mend_sensitivities(Engine *engine, double *const seeds[N_SEEDS]);
 
-/* zeno.c */
-/* Records a jump of the live point at its time; false if it is one too many. */
-bool zeno_record(Engine *engine, size_t jump);
-/* Notes that a jump is taken at one instant for the `count`th time, which is once too often; always false. */
-bool too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t);
+/* locate.c */
+/* Looks for the first event on the present step; FLOW_EVENT moves the point there. */
+FlowEnd engine_locate_event(Engine *engine, const Point *point, double level, double piece_end);
+/* Enables the guards that would cross within one instant after `t`, a time on or at the end of
+   the present step, if the flow could go on: neither a breakpoint nor the end of a run may hide a
+   crossing that rounding puts behind it. */
+bool engine_raise_levels(Engine *engine, const Point *point, double t);
+/* The same for the point itself, and for the border of the flow set under flow priority. */
+bool engine_raise_levels_here(Engine *engine, const Point *point);
+/* Goes straight on to a guard where the solver cannot, if it is as near as a solver comes; a flow map that is defined
+   up to a guard only, as a root is, stops it some ulp before. */
+bool engine_reach_guard(Engine *engine, const Point *point, double limit);
+
+/* flow.c */
+/* The next time event after the point, of those that are asked for, whose times must be there.  Times that differ by
+   rounding only are one, the latest of them. */
+double engine_next_time(Engine *engine, const Point *point, bool visible, bool internal);
+/* Flows to `limit` through the breakpoints on the way; with `locate` it stops at the first visible event. */
+FlowEnd engine_flow(Engine *engine, const Point *point, double limit, bool locate, size_t *budget);
+
+/* predict.c */
+typedef enum { ON_THE_WAY, AT_PREDICTED_EVENT, NOT_PREDICTED } Progress;
+/* Looks ahead where that saves work: after a step in which nothing came from outside, for as many more. */
+void engine_look_ahead(Engine *engine);
+/* Uses the prediction, if there is one, as far as it carries. */
+Progress engine_follow_prediction(Engine *engine, EventPolicy policy, size_t *budget, FlowEnd *end);
+/* The target lies a rounding or less than an instant behind the event: go there if the event is still due then and no
+   breakpoint lies between; otherwise the point stays at the event. */
+void engine_flow_past_event(Engine *engine, double target);
 
 #if defined(__GNUC__)
 #pragma GCC visibility pop

@@ -57,7 +57,7 @@ typedef struct {
     size_t low, high;
 } Verdict;
 
-double sample_time(double a, double b, size_t i)
+double engine_sample_time(double a, double b, size_t i)
 {
     return i + 1 == N_SAMPLES ? b : a + (b - a) * POINTS[i];
 }
@@ -121,14 +121,14 @@ static Verdict judge(const double *samples)
     return between_samples(false, samples);
 }
 
-void begin_rises(Rises *rises, Search *search, size_t row, double threshold)
+void engine_begin_rises(Rises *rises, Search *search, size_t row, double threshold)
 {
     const Step *step = &search->engine->step;
     rises->search = search;
     rises->row = row;
     rises->threshold = threshold;
     rises->begin = step->t0;
-    rises->value = sample(search, 0, row) - threshold;
+    rises->value = engine_sample(search, 0, row) - threshold;
     rises->ends[0] = step->t1;
     rises->n_ends = 1;
     rises->halvings = 0;
@@ -142,13 +142,14 @@ static void sample_piece(const Rises *rises, double end, double *samples)
     bool whole = rises->begin == step->t0 && end == step->t1;
     samples[0] = rises->value;
     for (size_t i = 1; i < N_SAMPLES; i++) {
-        double value = whole ? sample(search, i, rises->row)
-                             : look_at(search, ON_INTERPOLATION, sample_time(rises->begin, end, i), rises->row);
+        double value =
+            whole ? engine_sample(search, i, rises->row)
+                  : engine_look_at(search, ON_INTERPOLATION, engine_sample_time(rises->begin, end, i), rises->row);
         samples[i] = value - rises->threshold;
     }
 }
 
-bool next_rise(Rises *rises, double latest, Bracket *bracket)
+bool engine_next_rise(Rises *rises, double latest, Bracket *bracket)
 {
     double samples[N_SAMPLES];
     while (rises->n_ends > 0 && rises->begin <= latest) {
@@ -157,7 +158,7 @@ bool next_rise(Rises *rises, double latest, Bracket *bracket)
         if (rises->search->failed)
             return false;
         Verdict verdict = judge(samples);
-        double shortest = DEGREE * DEGREE * fmax(time_ulp(begin), time_ulp(end));
+        double shortest = DEGREE * DEGREE * fmax(engine_time_ulp(begin), engine_time_ulp(end));
         if (!verdict.settled && rises->halvings < HALVINGS && end - begin > shortest) {
             rises->halvings++;
             rises->ends[rises->n_ends++] = 0.5 * (begin + end);
@@ -167,8 +168,8 @@ bool next_rise(Rises *rises, double latest, Bracket *bracket)
         rises->begin = end;
         rises->value = samples[DEGREE];
         if (verdict.low < verdict.high) {
-            *bracket = (Bracket){sample_time(begin, end, verdict.low), samples[verdict.low],
-                                 sample_time(begin, end, verdict.high), samples[verdict.high]};
+            *bracket = (Bracket){engine_sample_time(begin, end, verdict.low), samples[verdict.low],
+                                 engine_sample_time(begin, end, verdict.high), samples[verdict.high]};
             return true;
         }
     }

@@ -1,5 +1,5 @@
-/* What locating an event on the present step needs to know: shared by
-   sets.c, rises.c, crossings.c and locate.c. */
+/* What locating an event on the present step needs to know: shared by samples.c, rises.c, crossings.c and locate.c,
+   each of which calls those before it only. */
 #ifndef HYBRID_SEARCH_H
 #define HYBRID_SEARCH_H
 
@@ -42,33 +42,35 @@ typedef struct {
     int halvings;
 } Rises;
 
-/* crossings.c */
+/* samples.c */
 /* Fills `rows` with the margins at a time of the step; a failure is noted in the search and ends every
    loop on it. */
-bool look(Search *search, Path path, double t, double *rows);
+bool engine_look(Search *search, Path path, double t, double *rows);
 /* The same where the run need not come: a failure only says that nothing is known. */
-bool try_to_look(Search *search, Path path, double t, double *rows);
+bool engine_try_to_look(Search *search, Path path, double t, double *rows);
 /* The value of one row. */
-double look_at(Search *search, Path path, double t, size_t row);
+double engine_look_at(Search *search, Path path, double t, size_t row);
 /* The value of one row in a sample of the present step. */
-double sample(const Search *search, size_t i, size_t row);
-/* Shrinks a bracket on the solver's step to the width at which a crossing is located. */
-void polish(Search *search, size_t row, Bracket *bracket);
-/* The first guard crossing on the step; with flow priority guards are not looked at inside the flow set. */
-bool first_guard(Search *search, double *t);
-/* The last time before `t` at which the flow set's margin falls below zero: minus infinity if the interpolation has
-   none, not a number if the step has none. */
-double last_inside(Search *search, double t);
-/* The time at which the flow set is left, if the step leaves it by more than the tolerance. */
-bool first_exit(Search *search, double *t);
+double engine_sample(const Search *search, size_t i, size_t row);
 
 /* rises.c */
 /* The time of a sample of the piece from a to b. */
-double sample_time(double a, double b, size_t i);
+double engine_sample_time(double a, double b, size_t i);
 /* Begins at the start of the present step, whose samples must be there. */
-void begin_rises(Rises *rises, Search *search, size_t row, double threshold);
+void engine_begin_rises(Rises *rises, Search *search, size_t row, double threshold);
 /* The next bracket among the pieces that begin up to `latest`; false if there is none, or on failure. */
-bool next_rise(Rises *rises, double latest, Bracket *bracket);
+bool engine_next_rise(Rises *rises, double latest, Bracket *bracket);
+
+/* crossings.c */
+/* Shrinks a bracket on the solver's step to the width at which a crossing is located. */
+void engine_refine_bracket(Search *search, size_t row, Bracket *bracket);
+/* The first guard crossing on the step; with flow priority guards are not looked at inside the flow set. */
+bool engine_first_guard(Search *search, double *t);
+/* The last time before `t` at which the flow set's margin falls below zero: minus infinity if the interpolation has
+   none, not a number if the step has none. */
+double engine_last_inside(Search *search, double t);
+/* The time at which the flow set is left, if the step leaves it by more than the tolerance. */
+bool engine_first_exit(Search *search, double *t);
 
 #if defined(__GNUC__)
 #pragma GCC visibility pop

@@ -1,67 +1,72 @@
 /* The margins of the jump sets and of the flow set at a point, and whether a flow may begin there. */
 #include <math.h>
 
-#include "search.h"
+#include "parts.h"
 
-double one_instant(const Engine *engine, double t)
+double engine_one_instant(const Engine *engine, double t)
 {
     const ModelScales *scales = &engine->model->scales;
     const Status *status = engine->status;
     double by_run = scales->instant * (t - status->start_time);
     double by_gap = scales->instant_in_gap * (t - status->jumps_time);
-    return fmax(scales->roundings * time_ulp(t), fmin(by_run, by_gap));
+    return fmax(scales->roundings * engine_time_ulp(t), fmin(by_run, by_gap));
 }
 
-bool evaluate_margins(Engine *engine, double t, const double *x, const double *z)
+bool engine_evaluate_margins(Engine *engine, double t, const double *x, const double *z)
 {
     const Model *m = engine->model;
     if (m->n_margins == 0)
         return true;
-    if (!evaluate(engine, m->margins, t, x, z, engine->margins, NULL))
-        return problem(engine, ENDED_FAILED, "The jump sets of '%s' could not be evaluated at t = %.17g.", m->name, t);
+    if (!engine_evaluate(engine, m->margins, t, x, z, engine->margins, NULL))
+        return engine_fail(engine, ENDED_FAILED, "The jump sets of '%s' could not be evaluated at t = %.17g.", m->name,
+                           t);
     for (size_t i = 0; i < m->n_margins; i++)
         if (isnan(engine->margins[i]))
-            return problem(engine, ENDED_NOT_FINITE,
-                           "The jump margin '%s' is not a number at t = %.17g; margins must be numbers. Remedy: check "
-                           "the jump set for 0/0 or the root of a negative number.",
-                           NAME_AT(m->names, m->margin_names[i]), t);
+            return engine_fail(
+                engine, ENDED_NOT_FINITE,
+                "The jump margin '%s' is not a number at t = %.17g; margins must be numbers. Remedy: check "
+                "the jump set for 0/0 or the root of a negative number.",
+                NAME_AT(m->names, m->margin_names[i]), t);
     return true;
 }
 
-bool evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin)
+bool engine_evaluate_flow_set(Engine *engine, double t, const double *x, const double *z, double *margin)
 {
     const char *name = engine->model->name;
-    if (!evaluate(engine, engine->model->flow_set, t, x, z, margin, NULL))
-        return problem(engine, ENDED_FAILED, "The flow set of '%s' could not be evaluated at t = %.17g.", name, t);
+    if (!engine_evaluate(engine, engine->model->flow_set, t, x, z, margin, NULL))
+        return engine_fail(engine, ENDED_FAILED, "The flow set of '%s' could not be evaluated at t = %.17g.", name, t);
     if (isnan(*margin))
-        return problem(engine, ENDED_NOT_FINITE,
-                       "The margin of the flow set of '%s' is not a number at t = %.17g; margins must be numbers. "
-                       "Remedy: check the flow set for 0/0 or the root of a negative number.",
-                       name, t);
+        return engine_fail(engine, ENDED_NOT_FINITE,
+                           "The margin of the flow set of '%s' is not a number at t = %.17g; margins must be numbers. "
+                           "Remedy: check the flow set for 0/0 or the root of a negative number.",
+                           name, t);
     return true;
 }
 
-bool blocked(Engine *engine, double t, const double *x, const double *z, double margin)
+bool engine_blocked(Engine *engine, double t, const double *x, const double *z, double margin)
 {
     char values[MESSAGE_SIZE / 2];
-    return problem(engine, ENDED_BLOCKED,
-                   "Blocked: at t = %.17g the state is outside the flow set (margin %.6g < 0) and no jump is enabled; "
-                   "%s. Remedy: extend the flow set or the jump set so that one of them holds the state.",
-                   t, margin, describe_state(engine, x, z, values, sizeof values));
+    return engine_fail(
+        engine, ENDED_BLOCKED,
+        "Blocked: at t = %.17g the state is outside the flow set (margin %.6g < 0) and no jump is enabled; "
+        "%s. Remedy: extend the flow set or the jump set so that one of them holds the state.",
+        t, margin, engine_describe_state(engine, x, z, values, sizeof values));
 }
 
 /* The margin of the flow set at a point that the run need not reach; not a number if there is none. */
 static double trial_margin(Engine *engine, double t, const double *x, const double *z)
 {
     double margin;
-    return evaluate(engine, engine->model->flow_set, t, x, z, &margin, NULL) ? margin : (double)NAN;
+    return engine_evaluate(engine, engine->model->flow_set, t, x, z, &margin, NULL) ? margin : (double)NAN;
 }
 
 /* How much the margin changes when states move by a small part of their sizes, all one way or to and fro: no simple
    sum of states hides from both. */
-static double change_by_size(Engine *engine, const Point *point, double t, const double *x, double here, bool to_and_fro)
+static double change_by_size(Engine *engine, const Point *point, double t, const double *x, double here,
+                             bool to_and_fro)
 {
-    double *moved = engine->probe_x, border = engine->model->scales.border, largest = largest_state(engine, point, x);
+    double *moved = engine->probe_x, border = engine->model->scales.border,
+           largest = engine_largest_state(engine, point, x);
     for (size_t i = 0; i < engine->model->n_states; i++) {
         double turns = (double)i * 0.6180339887498949, weight = 1.0 - 0.5 * (turns - (double)(size_t)turns);
         double sign = to_and_fro && i % 2 ? -1.0 : 1.0;
@@ -78,8 +83,8 @@ static double change_by_size(Engine *engine, const Point *point, double t, const
 static double change_by_time(Engine *engine, const Point *point, double t, const double *x, double here)
 {
     const Model *m = engine->model;
-    double *rates = engine->probe_k[1], *moved = engine->probe_x, wait = one_instant(engine, t);
-    if (m->n_states > 0 && !evaluate(engine, m->flow, t, x, point->z, rates, NULL))
+    double *rates = engine->probe_k[1], *moved = engine->probe_x, wait = engine_one_instant(engine, t);
+    if (m->n_states > 0 && !engine_evaluate(engine, m->flow, t, x, point->z, rates, NULL))
         return 0.0;
     for (size_t i = 0; i < m->n_states; i++) {
         if (!isfinite(rates[i]))
@@ -89,19 +94,20 @@ static double change_by_time(Engine *engine, const Point *point, double t, const
     return fabs(trial_margin(engine, t, moved, point->z) - here);
 }
 
-double flow_border(Engine *engine, const Point *point, double t, const double *x)
+double engine_flow_border(Engine *engine, const Point *point, double t, const double *x)
 {
     double here = trial_margin(engine, t, x, point->z);
-    double by_size = fmax(change_by_size(engine, point, t, x, here, false), change_by_size(engine, point, t, x, here, true));
+    double by_size =
+        fmax(change_by_size(engine, point, t, x, here, false), change_by_size(engine, point, t, x, here, true));
     double width = by_size + change_by_time(engine, point, t, x, here);
     return isfinite(width) ? width : 0.0;
 }
 
-bool leads_out(Engine *engine, const Point *point, double margin, bool *out)
+bool engine_leads_out(Engine *engine, const Point *point, double margin, bool *out)
 {
     const Status *status = engine->status;
     double h, t = *point->time;
-    if (!first_step(engine, point, fmax(status->stop_time, t), &h))
+    if (!engine_first_step(engine, point, fmax(status->stop_time, t), &h))
         return false;
     double probe = engine->model->scales.probe * h;
     /* Nothing is evaluated beyond the end of the run. */
@@ -110,22 +116,22 @@ bool leads_out(Engine *engine, const Point *point, double margin, bool *out)
     if (!forward && t - probe < status->start_time)
         return true;
     double there = forward ? t + probe : t - probe;
-    if (!step_probe(engine, point, there))
+    if (!engine_step_probe(engine, point, there))
         return false;
     double change = trial_margin(engine, there, engine->probe_x, point->z) - margin;
     *out = forward ? change < 0.0 : change > 0.0;
     return true;
 }
 
-bool flow_may_begin(Engine *engine, const Point *point, double *level)
+bool engine_flow_may_begin(Engine *engine, const Point *point, double *level)
 {
     double margin, t = *point->time;
     *level = 0.0;
     if (!engine->model->has_flow_set)
         return true;
-    if (!evaluate_flow_set(engine, t, point->x, point->z, &margin))
+    if (!engine_evaluate_flow_set(engine, t, point->x, point->z, &margin))
         return false;
     *level = fmin(0.0, margin);
-    return margin >= 0.0 || margin >= -flow_border(engine, point, t, point->x) ||
-           blocked(engine, t, point->x, point->z, margin);
+    return margin >= 0.0 || margin >= -engine_flow_border(engine, point, t, point->x) ||
+           engine_blocked(engine, t, point->x, point->z, margin);
 }

@@ -1,28 +1,43 @@
-/* Values that go in and out: setting, and the views that a reader is shown. */
+/* Values at a point: maps evaluated there, how large states have been, and setting from outside. */
+#include <float.h>
 #include <math.h>
 
 #include "parts.h"
 
-double state_size(const Engine *engine, const Point *point, size_t i, double x)
+double engine_time_ulp(double t)
+{
+    double size = fabs(t);
+    return nextafter(size, INFINITY) - size;
+}
+
+double engine_state_size(const Engine *engine, const Point *point, size_t i, double x)
 {
     double nominal = engine->model->nominals[i];
     return nominal > 0.0 ? nominal : fmax(point->size[i], fabs(x));
 }
 
-void note_sizes(const Engine *engine, const Point *point)
+double engine_largest_state(const Engine *engine, const Point *point, const double *x)
+{
+    double largest = fmax(DBL_MIN / engine->model->scales.absolute, engine->status->floor);
+    for (size_t i = 0; i < engine->model->n_states; i++)
+        largest = fmax(largest, engine_state_size(engine, point, i, x[i]));
+    return largest;
+}
+
+void engine_note_sizes(const Engine *engine, const Point *point)
 {
     for (size_t i = 0; i < engine->model->n_states; i++)
         point->size[i] = fmax(point->size[i], fabs(point->x[i]));
 }
 
-void clear_levels(const Engine *engine, const Point *point)
+void engine_clear_levels(const Engine *engine, const Point *point)
 {
     for (size_t i = 0; i <= engine->model->n_margins; i++)
         point->level[i] = 0.0;
 }
 
-bool evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
-              double *second)
+bool engine_evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
+                     double *second)
 {
     /* The function may use the places behind its own for the functions that it calls. */
     engine->arg[0] = &t;
@@ -35,8 +50,18 @@ bool evaluate(Engine *engine, ModelFunction function, double t, const double *x,
     return function(engine->arg, engine->res, engine->iw, engine->w, 0) == 0;
 }
 
+bool engine_rates(Engine *engine, double t, const double *x, const double *z, double *result)
+{
+    if (engine->model->n_states == 0)
+        return true;
+    if (engine_evaluate(engine, engine->model->flow, t, x, z, result, NULL))
+        return true;
+    return engine_fail(engine, ENDED_FAILED, "The flow map of '%s' could not be evaluated at t = %.17g.",
+                       engine->model->name, t);
+}
+
 /* Something that the future depends on has changed. */
-void changed(Engine *engine)
+void engine_changed(Engine *engine)
 {
     *engine->live.step = 0.0;
     engine->status->prediction = PREDICTION_NONE;
@@ -63,8 +88,8 @@ void engine_set_span(Engine *engine, double start, double stop)
 void engine_set_time(Engine *engine, double t)
 {
     *engine->live.time = t;
-    clear_levels(engine, &engine->live);
-    changed(engine);
+    engine_clear_levels(engine, &engine->live);
+    engine_changed(engine);
 }
 
 double engine_time(const Engine *engine)
@@ -83,115 +108,13 @@ void engine_set(Engine *engine, Bank bank, size_t index, double value)
     values[index] = value;
     /* Guards that were reached by rounding were so in the state before. */
     if (bank == BANK_STATE)
-        clear_levels(engine, &engine->live);
-    changed(engine);
-}
-
-static bool show(Engine *engine, View view)
-{
-    const Point *shown = &engine->shown;
-    size_t jump;
-    copy_point(engine, &engine->live, shown);
-    if (view == VIEW_START) {
-        if (!evaluate(engine, engine->model->start, *shown->time, shown->x, shown->z, engine->reset.x,
-                      engine->reset.z))
-            return problem(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.",
-                           engine->model->name);
-        return accept_state(engine, engine->model->n_jumps, shown);
-    }
-    if (view == VIEW_PENDING && engine->status->ending == ENDED_NOT) {
-        if (!take_internal_jumps(engine, shown) || !first_enabled(engine, shown, &jump))
-            return false;
-        if (jump < engine->model->n_jumps)
-            return apply_reset(engine, jump, shown) && take_internal_jumps(engine, shown);
-    }
-    return true;
+        engine_clear_levels(engine, &engine->live);
+    engine_changed(engine);
 }
 
 void engine_set_states(Engine *engine, const double *x)
 {
-    copy_values(engine->live.x, x, engine->model->n_states);
-    clear_levels(engine, &engine->live);
-    changed(engine);
-}
-
-bool hold_view(Engine *engine, View view)
-{
-    if (engine->view == view)
-        return true;
-    engine->view = VIEW_NONE;
-    engine->has_outputs = engine->has_rates = engine->has_indicators = false;
-    if (!show(engine, view))
-        return false;
-    engine->view = view;
-    return true;
-}
-
-static bool evaluate_view(Engine *engine, ModelFunction function, const char *what, double *result, bool *has)
-{
-    const Point *shown = &engine->shown;
-    if (!*has && !evaluate(engine, function, *shown->time, shown->x, shown->z, result, NULL))
-        return problem(engine, ENDED_FAILED, "The %s of '%s' could not be evaluated at t = %.17g.", what,
-                       engine->model->name, *shown->time);
-    *has = true;
-    return true;
-}
-
-static bool indicators(Engine *engine)
-{
-    const Model *m = engine->model;
-    bool has_flow_set = engine->has_indicators || !m->has_flow_set;
-    return evaluate_view(engine, m->flow_set, "flow set", engine->indicators + m->n_margins, &has_flow_set) &&
-           evaluate_view(engine, m->margins, "jump sets", engine->indicators, &engine->has_indicators);
-}
-
-void engine_note_rates(Engine *engine)
-{
-    const Model *m = engine->model;
-    const double *rates = m->has_flow_set ? engine_values(engine, VIEW_LIVE, BANK_DERIVATIVE) : NULL;
-    for (size_t i = 0; i < m->n_states; i++)
-        if (!rates || !isfinite(rates[i]))
-            return;
-    copy_values(engine->inner_rates, rates, m->n_states);
-    engine->status->has_inner_rates = true;
-}
-
-const double *engine_outer_rates(Engine *engine, View view)
-{
-    const Model *m = engine->model;
-    double margin;
-    if (!engine->status->has_inner_rates || !m->has_flow_set || !hold_view(engine, view))
-        return NULL;
-    const Point *shown = &engine->shown;
-    bool outside = evaluate(engine, m->flow_set, *shown->time, shown->x, shown->z, &margin, NULL) && margin < 0.0;
-    return outside ? engine->inner_rates : NULL;
-}
-
-size_t engine_indicators(const Engine *engine)
-{
-    return engine->model->n_margins + (engine->model->has_flow_set ? 1 : 0);
-}
-
-const double *engine_values(Engine *engine, View view, Bank bank)
-{
-    const Model *m = engine->model;
-    if (bank == BANK_INPUT)
-        return engine->u;
-    if (bank == BANK_PARAMETER)
-        return engine->p;
-    /* What is as it is need not be copied to be shown. */
-    if (view == VIEW_LIVE && (bank == BANK_STATE || bank == BANK_DISCRETE))
-        return bank == BANK_STATE ? engine->live.x : engine->live.z;
-    if (!hold_view(engine, view))
-        return NULL;
-    switch (bank) {
-    case BANK_STATE: return engine->shown.x;
-    case BANK_DISCRETE: return engine->shown.z;
-    case BANK_DERIVATIVE:
-        return evaluate_view(engine, m->flow, "flow map", engine->rates, &engine->has_rates) ? engine->rates : NULL;
-    case BANK_INDICATOR: return indicators(engine) ? engine->indicators : NULL;
-    default:
-        return evaluate_view(engine, m->outputs, "outputs", engine->outputs, &engine->has_outputs) ? engine->outputs
-                                                                                                 : NULL;
-    }
+    engine_copy(engine->live.x, x, engine->model->n_states);
+    engine_clear_levels(engine, &engine->live);
+    engine_changed(engine);
 }

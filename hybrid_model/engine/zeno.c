@@ -50,7 +50,7 @@ static bool crowded(const Engine *engine, const JumpHistory *history, double t)
 {
     const ModelScales *scales = &engine->model->scales;
     double span = t - history->burst_start;
-    double least = scales->jumps_in_window * scales->chatter * time_ulp(t);
+    double least = scales->jumps_in_window * scales->chatter * engine_time_ulp(t);
     return (double)history->burst >= scales->jumps_in_window && span <= fmax(scales->crowd * history->longest, least);
 }
 
@@ -70,24 +70,25 @@ static bool shrinking(const ModelScales *scales, const JumpHistory *history, dou
     return greatest < 1.0 && greatest - least <= scales->spread * *ratio;
 }
 
-bool too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t)
+bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t)
 {
     const ModelJump *entry = &engine->model->jumps[jump];
     const char *name = NAME_AT(engine->model->names, entry->name);
     if (entry->kind == JUMP_ON_TIME)
-        return problem(engine, ENDED_ZENO,
-                       "Zeno: %llu jumps of '%s' at one instant, t = %.10g s: its time is still not after the present. "
-                       "Remedy: let the jump map move the time on past it; where a run starts later than its clock, "
-                       "declare the clock's state with computed=True and let start_map give the next time to come.",
+        return engine_fail(
+            engine, ENDED_ZENO,
+            "Zeno: %llu jumps of '%s' at one instant, t = %.10g s: its time is still not after the present. "
+            "Remedy: let the jump map move the time on past it; where a run starts later than its clock, "
+            "declare the clock's state with computed=True and let start_map give the next time to come.",
+            count, name, t);
+    return engine_fail(engine, ENDED_ZENO,
+                       "Zeno: %llu jumps of '%s' at one instant, t = %.10g s. "
+                       "Remedy: let the jump leave its jump set, or give the jump set a minimum dwell time; a trigger "
+                       "whose two sides are both zero fires for ever unless its inequality is strict.",
                        count, name, t);
-    return problem(engine, ENDED_ZENO,
-                   "Zeno: %llu jumps of '%s' at one instant, t = %.10g s. "
-                   "Remedy: let the jump leave its jump set, or give the jump set a minimum dwell time; a trigger "
-                   "whose two sides are both zero fires for ever unless its inequality is strict.",
-                   count, name, t);
 }
 
-bool zeno_record(Engine *engine, size_t jump)
+bool engine_zeno_record(Engine *engine, size_t jump)
 {
     const ModelScales *scales = &engine->model->scales;
     JumpHistory *history = &engine->history[jump];
@@ -96,23 +97,25 @@ bool zeno_record(Engine *engine, size_t jump)
     remember(scales, history, t);
     unsigned long long total = history->total, burst = history->burst;
     if ((double)history->at_once > scales->jumps_at_once)
-        return too_many_at_once(engine, jump, history->at_once, t);
+        return engine_too_many_at_once(engine, jump, history->at_once, t);
     /* Times that are known are the author's own. */
     if (engine->model->jumps[jump].kind == JUMP_ON_TIME)
         return true;
     if (shrinking(scales, history, &gap, &ratio)) {
         double rest = gap * ratio / (1.0 - ratio);
-        if (rest <= fmax(scales->accumulation * history->shrinking_from, scales->resolved * time_ulp(t)))
-            return problem(engine, ENDED_ZENO,
-                           "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "
-                           "ratio %.3f). Remedy: end the run before that time, or give the jump set a minimum dwell "
-                           "time.",
-                           total, name, t, t + rest, gap, ratio);
+        if (rest <= fmax(scales->accumulation * history->shrinking_from, scales->resolved * engine_time_ulp(t)))
+            return engine_fail(
+                engine, ENDED_ZENO,
+                "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "
+                "ratio %.3f). Remedy: end the run before that time, or give the jump set a minimum dwell "
+                "time.",
+                total, name, t, t + rest, gap, ratio);
     }
     if (crowded(engine, history, t))
-        return problem(engine, ENDED_ZENO,
-                       "Zeno: %llu jumps of '%s' in %.2g s around t = %.10g s. Remedy: end the run before that time, "
-                       "or give the jump set a minimum dwell time.",
-                       burst, name, t - history->burst_start, t);
+        return engine_fail(
+            engine, ENDED_ZENO,
+            "Zeno: %llu jumps of '%s' in %.2g s around t = %.10g s. Remedy: end the run before that time, "
+            "or give the jump set a minimum dwell time.",
+            burst, name, t - history->burst_start, t);
     return true;
 }

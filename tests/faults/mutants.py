@@ -93,8 +93,8 @@ MUTANTS = [
     Mutant(
         "a wider tolerance",
         "sets.c",
-        "return fmax(scales->roundings * time_ulp(t),",
-        "return fmax(1e6 * scales->roundings * time_ulp(t),",
+        "return fmax(scales->roundings * engine_time_ulp(t),",
+        "return fmax(1e6 * scales->roundings * engine_time_ulp(t),",
         "what is 1e-9 of the time apart is not simultaneous",
         "check_crossings_at_the_ends",
     ),
@@ -109,7 +109,7 @@ MUTANTS = [
     Mutant(
         "times that differ by rounding are two",
         "engine.c",
-        "time <= first + m->scales.roundings * time_ulp(first)",
+        "time <= first + m->scales.roundings * engine_time_ulp(first)",
         "time <= first",
         "3 * 0.1 and 0.3 are one time",
         "check_co_simulation",
@@ -133,7 +133,7 @@ MUTANTS = [
     Mutant(
         "breakpoints are not seen",
         "jumps.c",
-        "        if (!apply_reset(engine, internal, point))\n            return false;\n    }",
+        "        if (!engine_apply_reset(engine, internal, point))\n            return false;\n    }",
         "        return true;\n    }",
         "breakpoints of the flow",
         "check_co_simulation",
@@ -149,8 +149,8 @@ MUTANTS = [
     Mutant(
         "flow anywhere",
         "sets.c",
-        "return margin >= 0.0 || margin >= -flow_border(",
-        "return true || margin >= -flow_border(",
+        "return margin >= 0.0 || margin >= -engine_flow_border(",
+        "return true || margin >= -engine_flow_border(",
         "a state outside both sets is blocked",
         "check_ends",
     ),
@@ -264,8 +264,8 @@ MUTANTS = [
     Mutant(
         "inputs do not end a prediction",
         "values.c",
-        "        clear_levels(engine, &engine->live);\n    changed(engine);\n}\n\nstatic",
-        "        clear_levels(engine, &engine->live);\n    engine->view = VIEW_NONE;\n}\n\nstatic",
+        "        engine_clear_levels(engine, &engine->live);\n    engine_changed(engine);\n}\n\nstatic",
+        "        engine_clear_levels(engine, &engine->live);\n    engine->view = VIEW_NONE;\n}\n\nstatic",
         "what comes from outside counts from then on",
         "check_co_simulation",
     ),
@@ -393,7 +393,7 @@ MUTANTS = [
     Mutant(
         "arrival is not looked at",
         "engine.c",
-        "    return raise_levels_here(engine, &engine->live);\n}",
+        "    return engine_raise_levels_here(engine, &engine->live);\n}",
         "    return true;\n}",
         "Model Exchange: an importer that stops a little short",
         "check_arrival",
@@ -418,8 +418,8 @@ MUTANTS = [
     Mutant(
         "no rounding in the stop time",
         "stepping.c",
-        "return 32.0 * time_ulp",
-        "return 0.0 * time_ulp",
+        "return 32.0 * engine_time_ulp",
+        "return 0.0 * engine_time_ulp",
         "importers add up times",
         "check_step_arguments",
     ),
@@ -566,8 +566,8 @@ MUTANTS += [
     Mutant(
         "any number",
         "access.c",
-        '    if (!isfinite(value))\n        return refuse(instance, "%s: %s: the value',
-        '    if (value > 1e300 && isnan(value))\n        return refuse(instance, "%s: %s: the value',
+        '    if (!isfinite(value))\n        return instance_refuse(instance, "%s: %s: the value',
+        '    if (value > 1e300 && isnan(value))\n        return instance_refuse(instance, "%s: %s: the value',
         "NaN and infinity are refused",
         "check_values",
     ),

@@ -51,10 +51,10 @@ static int gather(const NetworkWork *work, ShareOf share_of, const NetworkInstan
         Share share = share_of(&n->groups[member->group], member);
         if (share.function == NULL)
             continue;
-        part_bind(work, member, values);
+        network_part_bind(work, member, values);
         if (tangents != NULL)
-            part_bind_tangents(work, member, tangents);
-        if (part_call(work, share.function, result + share.at, NULL) != 0)
+            network_part_bind_tangents(work, member, tangents);
+        if (network_part_call(work, share.function, result + share.at, NULL) != 0)
             return 1;
     }
     return 0;
@@ -63,11 +63,11 @@ static int gather(const NetworkWork *work, ShareOf share_of, const NetworkInstan
 /* Wire, then gather: a map of the network that gives one vector. */
 static int map(const Network *n, ShareOf share_of, const double **arg, double **res, long long *iw, double *w)
 {
-    NetworkWork work = part_work(n, arg, res, iw, w);
-    NetworkInstant values = part_instant(arg);
+    NetworkWork work = network_part_work(n, arg, res, iw, w);
+    NetworkInstant values = network_part_instant(arg);
     if (res[0] == NULL)
         return 0;
-    return part_wire(&work, &values, NULL) != 0 || gather(&work, share_of, &values, NULL, res[0]) != 0;
+    return network_part_wire(&work, &values, NULL) != 0 || gather(&work, share_of, &values, NULL, res[0]) != 0;
 }
 
 int network_flow(const Network *n, const double **arg, double **res, long long *iw, double *w)
@@ -92,22 +92,22 @@ int network_outputs(const Network *n, const double **arg, double **res, long lon
 
 int network_forward(const Network *n, const double **arg, double **res, long long *iw, double *w)
 {
-    NetworkWork work = part_work(n, arg, res, iw, w);
-    NetworkInstant values = part_instant(arg), tangents = part_instant(arg + MODEL_N_ARG);
-    return part_wire(&work, &values, &tangents) != 0 ||
+    NetworkWork work = network_part_work(n, arg, res, iw, w);
+    NetworkInstant values = network_part_instant(arg), tangents = network_part_instant(arg + MODEL_N_ARG);
+    return network_part_wire(&work, &values, &tangents) != 0 ||
            gather(&work, rate_tangents, &values, &tangents, res[0]) != 0 ||
            gather(&work, output_tangents, &values, &tangents, res[1]) != 0;
 }
 
 int network_flow_set(const Network *n, const double **arg, double **res, long long *iw, double *w)
 {
-    NetworkWork work = part_work(n, arg, res, iw, w);
-    NetworkInstant values = part_instant(arg);
+    NetworkWork work = network_part_work(n, arg, res, iw, w);
+    NetworkInstant values = network_part_instant(arg);
     bool first = true;
     if (res[0] == NULL)
         return 0;
     *res[0] = 1.0;
-    if (part_wire(&work, &values, NULL) != 0)
+    if (network_part_wire(&work, &values, NULL) != 0)
         return 1;
     for (size_t i = 0; i < n->n_members; i++) {
         const NetworkMember *member = &n->members[i];
@@ -115,8 +115,8 @@ int network_flow_set(const Network *n, const double **arg, double **res, long lo
         double margin;
         if (!group->has_flow_set)
             continue;
-        part_bind(&work, member, &values);
-        if (part_call(&work, group->flow_set, &margin, NULL) != 0)
+        network_part_bind(&work, member, &values);
+        if (network_part_call(&work, group->flow_set, &margin, NULL) != 0)
             return 1;
         *res[0] = first ? margin : fmin(*res[0], margin);
         first = false;
@@ -126,16 +126,16 @@ int network_flow_set(const Network *n, const double **arg, double **res, long lo
 
 int network_reset(const Network *n, size_t jump, const double **arg, double **res, long long *iw, double *w)
 {
-    NetworkWork work = part_work(n, arg, res, iw, w);
-    NetworkInstant values = part_instant(arg);
+    NetworkWork work = network_part_work(n, arg, res, iw, w);
+    NetworkInstant values = network_part_instant(arg);
     const NetworkMember *member = &n->members[n->jump_member[jump]];
     const NetworkGroup *group = &n->groups[member->group];
     double *x = res[0], *z = res[1];
-    if (part_wire(&work, &values, NULL) != 0)
+    if (network_part_wire(&work, &values, NULL) != 0)
         return 1;
-    part_copy(n->n_states, values.x, x);
-    part_copy(n->n_discrete, values.z, z);
-    part_bind(&work, member, &values);
-    return part_call(&work, group->resets[jump - member->jump], x != NULL ? x + member->x : NULL,
-                z != NULL ? z + member->z : NULL);
+    network_part_copy(n->n_states, values.x, x);
+    network_part_copy(n->n_discrete, values.z, z);
+    network_part_bind(&work, member, &values);
+    return network_part_call(&work, group->resets[jump - member->jump], x != NULL ? x + member->x : NULL,
+                             z != NULL ? z + member->z : NULL);
 }

@@ -1,7 +1,7 @@
 /* One part of a network: where its arguments are, and what they are wired to (see network_part.h). */
 #include "network_part.h"
 
-NetworkWork part_work(const Network *n, const double **arg, double **res, long long *iw, double *w)
+NetworkWork network_part_work(const Network *n, const double **arg, double **res, long long *iw, double *w)
 {
     NetworkWork work = {.network = n, .arg = arg + NETWORK_ARG, .res = res + NETWORK_RES, .iw = iw};
     work.x = w;
@@ -25,18 +25,18 @@ NetworkWork part_work(const Network *n, const double **arg, double **res, long l
     return work;
 }
 
-NetworkInstant part_instant(const double *const *arg)
+NetworkInstant network_part_instant(const double *const *arg)
 {
     NetworkInstant values = {arg[0], arg[1], arg[2], arg[3], arg[4], NULL};
     return values;
 }
 
-const double *part_from(const double *vector, size_t first)
+const double *network_part_from(const double *vector, size_t first)
 {
     return vector != NULL ? vector + first : NULL;
 }
 
-void part_copy(size_t count, const double *source, double *target)
+void network_part_copy(size_t count, const double *source, double *target)
 {
     if (target == NULL)
         return;
@@ -44,23 +44,23 @@ void part_copy(size_t count, const double *source, double *target)
         target[i] = source != NULL ? source[i] : 0.0;
 }
 
-void part_clear(size_t count, double *target)
+void network_part_clear(size_t count, double *target)
 {
-    part_copy(count, NULL, target);
+    network_part_copy(count, NULL, target);
 }
 
-void part_add(size_t count, const double *source, double *target)
+void network_part_add(size_t count, const double *source, double *target)
 {
     for (size_t i = 0; i < count; i++)
         target[i] += source[i];
 }
 
-NetworkSource part_bank(uint32_t source)
+NetworkSource network_part_bank(uint32_t source)
 {
     return (NetworkSource)(source >> NETWORK_SOURCE_BITS);
 }
 
-size_t part_place(uint32_t source)
+size_t network_part_place(uint32_t source)
 {
     return source & ((UINT32_C(1) << NETWORK_SOURCE_BITS) - 1);
 }
@@ -68,8 +68,8 @@ size_t part_place(uint32_t source)
 static double signal(const NetworkInstant *values, uint32_t source)
 {
     const double *const banks[] = {values->x, values->z, values->u, values->y};
-    const double *bank = banks[part_bank(source)];
-    return bank != NULL ? bank[part_place(source)] : 0.0;
+    const double *bank = banks[network_part_bank(source)];
+    return bank != NULL ? bank[network_part_place(source)] : 0.0;
 }
 
 /* Let arg[0..4] be the t, x, z, u, p of a member; its inputs are gathered. */
@@ -80,24 +80,24 @@ static void bind(const Network *n, const NetworkMember *member, const NetworkIns
     for (size_t i = 0; i < count; i++)
         inputs[i] = signal(values, n->sources[member->input + i]);
     arg[0] = values->t;
-    arg[1] = part_from(values->x, member->x);
-    arg[2] = part_from(values->z, member->z);
+    arg[1] = network_part_from(values->x, member->x);
+    arg[2] = network_part_from(values->z, member->z);
     arg[3] = inputs;
-    arg[4] = part_from(values->p, member->p);
+    arg[4] = network_part_from(values->p, member->p);
 }
 
-void part_bind(const NetworkWork *work, const NetworkMember *member, const NetworkInstant *values)
+void network_part_bind(const NetworkWork *work, const NetworkMember *member, const NetworkInstant *values)
 {
     bind(work->network, member, values, work->inputs, work->arg);
     work->arg[5] = work->network->constants + member->constant;
 }
 
-void part_bind_tangents(const NetworkWork *work, const NetworkMember *member, const NetworkInstant *tangents)
+void network_part_bind_tangents(const NetworkWork *work, const NetworkMember *member, const NetworkInstant *tangents)
 {
     bind(work->network, member, tangents, work->seed_inputs, work->arg + 6);
 }
 
-int part_call(const NetworkWork *work, ModelFunction function, double *first, double *second)
+int network_part_call(const NetworkWork *work, ModelFunction function, double *first, double *second)
 {
     work->res[0] = first;
     work->res[1] = second;
@@ -105,23 +105,23 @@ int part_call(const NetworkWork *work, ModelFunction function, double *first, do
 }
 
 /* One piece of the outputs of a member; `tangents` may be NULL. */
-int part_outputs(const NetworkWork *work, const NetworkCall *now, const NetworkInstant *values,
-                 const NetworkInstant *tangents)
+int network_part_outputs(const NetworkWork *work, const NetworkCall *now, const NetworkInstant *values,
+                         const NetworkInstant *tangents)
 {
     const NetworkPiece *piece = &work->network->pieces[now->piece];
     const NetworkMember *member = &work->network->members[now->member];
     size_t first = (size_t)member->y + piece->first;
-    part_bind(work, member, values);
-    if (part_call(work, piece->map.value, work->y + first, NULL) != 0)
+    network_part_bind(work, member, values);
+    if (network_part_call(work, piece->map.value, work->y + first, NULL) != 0)
         return 1;
     if (tangents == NULL)
         return 0;
-    part_bind_tangents(work, member, tangents);
-    return part_call(work, piece->map.forward, work->seeds.y + first, NULL);
+    network_part_bind_tangents(work, member, tangents);
+    return network_part_call(work, piece->map.forward, work->seeds.y + first, NULL);
 }
 
 /* Complete an instant by the outputs that inputs are wired to. */
-int part_wire(const NetworkWork *work, NetworkInstant *values, NetworkInstant *tangents)
+int network_part_wire(const NetworkWork *work, NetworkInstant *values, NetworkInstant *tangents)
 {
     const Network *n = work->network;
     values->y = work->y;
@@ -130,11 +130,11 @@ int part_wire(const NetworkWork *work, NetworkInstant *values, NetworkInstant *t
     if (n->n_calls == 0)
         return 0;
     /* Parts may be handed inputs that are not there yet, if what is computed does not depend on them. */
-    part_clear(n->n_outputs, work->y);
+    network_part_clear(n->n_outputs, work->y);
     if (tangents != NULL)
-        part_clear(n->n_outputs, work->seeds.y);
+        network_part_clear(n->n_outputs, work->seeds.y);
     for (size_t i = 0; i < n->n_calls; i++)
-        if (part_outputs(work, &n->calls[i], values, tangents) != 0)
+        if (network_part_outputs(work, &n->calls[i], values, tangents) != 0)
             return 1;
     return 0;
 }

@@ -2,10 +2,10 @@
 #include "network_part.h"
 
 /* The adjoints of a member's arguments, out of those of the results of one of its maps, into part. */
-int part_pull(const NetworkWork *work, const NetworkMember *member, const NetworkMap *map,
-              const NetworkInstant *values, const double *first, const double *second)
+int network_part_pull(const NetworkWork *work, const NetworkMember *member, const NetworkMap *map,
+                      const NetworkInstant *values, const double *first, const double *second)
 {
-    part_bind(work, member, values);
+    network_part_bind(work, member, values);
     work->arg[6] = first;
     work->arg[7] = second;
     work->res[0] = work->part.t;
@@ -17,15 +17,15 @@ int part_pull(const NetworkWork *work, const NetworkMember *member, const Networ
 }
 
 /* Add the adjoints in part, except those of the states, to those of the network. */
-void part_give_back(const NetworkWork *work, const NetworkMember *member)
+void network_part_give_back(const NetworkWork *work, const NetworkMember *member)
 {
     const NetworkGroup *group = &work->network->groups[member->group];
     double *const banks[] = {work->seeds.x, work->seeds.z, work->seeds.u, work->seeds.y};
     work->seeds.t[0] += work->part.t[0];
-    part_add(group->n_parameters, work->part.p, work->seeds.p + member->p);
+    network_part_add(group->n_parameters, work->part.p, work->seeds.p + member->p);
     for (size_t i = 0; i < group->n_inputs; i++) {
         uint32_t source = work->network->sources[member->input + i];
-        banks[part_bank(source)][part_place(source)] += work->part.u[i];
+        banks[network_part_bank(source)][network_part_place(source)] += work->part.u[i];
     }
 }
 
@@ -33,55 +33,55 @@ static int pull_back(const NetworkWork *work, const NetworkMember *member, const
                      const NetworkInstant *values, const double *first, const double *second)
 {
     const NetworkGroup *group = &work->network->groups[member->group];
-    if (part_pull(work, member, map, values, first, second) != 0)
+    if (network_part_pull(work, member, map, values, first, second) != 0)
         return 1;
-    part_add(group->n_states, work->part.x, work->seeds.x + member->x);
-    part_add(group->n_discrete, work->part.z, work->seeds.z + member->z);
-    part_give_back(work, member);
+    network_part_add(group->n_states, work->part.x, work->seeds.x + member->x);
+    network_part_add(group->n_discrete, work->part.z, work->seeds.z + member->z);
+    network_part_give_back(work, member);
     return 0;
 }
 
 /* The outputs of a piece: their adjoints go to what they were computed from. */
-int part_pull_outputs(const NetworkWork *work, const NetworkCall *now, const NetworkInstant *values)
+int network_part_pull_outputs(const NetworkWork *work, const NetworkCall *now, const NetworkInstant *values)
 {
     const NetworkPiece *piece = &work->network->pieces[now->piece];
     const NetworkMember *member = &work->network->members[now->member];
     double *seed = work->seeds.y + (size_t)member->y + piece->first;
     if (pull_back(work, member, &piece->map, values, seed, NULL) != 0)
         return 1;
-    part_clear(piece->count, seed);
+    network_part_clear(piece->count, seed);
     return 0;
 }
 
-void part_hand_out(const NetworkWork *work, double **res)
+void network_part_hand_out(const NetworkWork *work, double **res)
 {
     const Network *n = work->network;
-    part_copy(1, work->seeds.t, res[0]);
-    part_copy(n->n_states, work->seeds.x, res[1]);
-    part_copy(n->n_discrete, work->seeds.z, res[2]);
-    part_copy(n->n_inputs, work->seeds.u, res[3]);
-    part_copy(n->n_parameters, work->seeds.p, res[4]);
+    network_part_copy(1, work->seeds.t, res[0]);
+    network_part_copy(n->n_states, work->seeds.x, res[1]);
+    network_part_copy(n->n_discrete, work->seeds.z, res[2]);
+    network_part_copy(n->n_inputs, work->seeds.u, res[3]);
+    network_part_copy(n->n_parameters, work->seeds.p, res[4]);
 }
 
-void part_clear_adjoints(const NetworkWork *work)
+void network_part_clear_adjoints(const NetworkWork *work)
 {
     const Network *n = work->network;
-    part_clear(1, work->seeds.t);
-    part_clear(n->n_states, work->seeds.x);
-    part_clear(n->n_discrete, work->seeds.z);
-    part_clear(n->n_inputs, work->seeds.u);
-    part_clear(n->n_parameters, work->seeds.p);
-    part_clear(n->n_outputs, work->seeds.y);
+    network_part_clear(1, work->seeds.t);
+    network_part_clear(n->n_states, work->seeds.x);
+    network_part_clear(n->n_discrete, work->seeds.z);
+    network_part_clear(n->n_inputs, work->seeds.u);
+    network_part_clear(n->n_parameters, work->seeds.p);
+    network_part_clear(n->n_outputs, work->seeds.y);
 }
 
 int network_reverse(const Network *n, const double **arg, double **res, long long *iw, double *w)
 {
-    NetworkWork work = part_work(n, arg, res, iw, w);
-    NetworkInstant values = part_instant(arg);
+    NetworkWork work = network_part_work(n, arg, res, iw, w);
+    NetworkInstant values = network_part_instant(arg);
     const double *rates = arg[MODEL_N_ARG], *outputs = arg[MODEL_N_ARG + 1];
-    if (part_wire(&work, &values, NULL) != 0)
+    if (network_part_wire(&work, &values, NULL) != 0)
         return 1;
-    part_clear_adjoints(&work);
+    network_part_clear_adjoints(&work);
     for (size_t i = 0; i < n->n_members; i++) {
         const NetworkMember *member = &n->members[i];
         const NetworkGroup *group = &n->groups[member->group];
@@ -93,8 +93,8 @@ int network_reverse(const Network *n, const double **arg, double **res, long lon
             return 1;
     }
     for (size_t i = n->n_calls; i-- > 0;)
-        if (part_pull_outputs(&work, &n->calls[i], &values) != 0)
+        if (network_part_pull_outputs(&work, &n->calls[i], &values) != 0)
             return 1;
-    part_hand_out(&work, res);
+    network_part_hand_out(&work, res);
     return 0;
 }

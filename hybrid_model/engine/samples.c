@@ -1,0 +1,65 @@
+/* Margins along the present step: on the interpolation, or on the solver's own step from its start. */
+#include <float.h>
+#include <math.h>
+
+#include "search.h"
+
+/* Where a state is no number, that is the flow map's fault and not a margin's. */
+static bool states_are_finite(Engine *engine, double t, const double *x)
+{
+    const Model *m = engine->model;
+    for (size_t i = 0; i < m->n_states; i++)
+        if (!isfinite(x[i]))
+            return engine_fail(
+                engine, ENDED_NOT_FINITE,
+                "'%s' does not stay finite up to t = %.17g. Remedy: check its derivative for 0/0 or the root "
+                "of a negative number; trial steps look a little outside the flow set.",
+                NAME_AT(m->names, m->state_names[i]), t);
+    return true;
+}
+
+bool engine_look(Search *search, Path path, double t, double *rows)
+{
+    Engine *engine = search->engine;
+    const Model *m = engine->model;
+    const Step *step = &engine->step;
+    const double *x = path == ON_STEP ? engine->probe_x : engine->dense_x;
+    /* Both paths begin and end where the step does. */
+    if (t == step->t0 || t == step->t1)
+        x = t == step->t0 ? step->x0 : step->x1;
+    else if (path == ON_INTERPOLATION)
+        engine_step_dense(engine, t);
+    else if (!engine_step_probe(engine, search->point, t))
+        return !(search->failed = true);
+    if (!states_are_finite(engine, t, x) || !engine_evaluate_margins(engine, t, x, search->point->z))
+        return !(search->failed = true);
+    for (size_t i = 0; i < m->n_margins; i++)
+        rows[i] = engine->margins[i];
+    if (m->has_flow_set) {
+        double margin;
+        if (!engine_evaluate_flow_set(engine, t, x, search->point->z, &margin))
+            return !(search->failed = true);
+        /* Zero is inside the flow set, so it is not yet an exit. */
+        double outside = search->level - margin;
+        rows[search->exit_row] = outside == 0.0 ? -DBL_MIN : outside;
+    }
+    return true;
+}
+
+bool engine_try_to_look(Search *search, Path path, double t, double *rows)
+{
+    bool seen = engine_look(search, path, t, rows);
+    search->failed = false;
+    return seen;
+}
+
+double engine_look_at(Search *search, Path path, double t, size_t row)
+{
+    double *rows = search->engine->samples + N_SAMPLES * search->n_rows;
+    return engine_look(search, path, t, rows) ? rows[row] : 0.0;
+}
+
+double engine_sample(const Search *search, size_t i, size_t row)
+{
+    return search->engine->samples[i * search->n_rows + row];
+}
