@@ -1,4 +1,4 @@
-"""Clocks of weights, switching and triggers: which interval or row holds a time, and when it ends; common periods.
+"""Functions of time: which interval or row of a clock holds a time, and when it ends; periods, domains.
 
 It imports nothing else of `consensus`.
 """

@@ -18,7 +18,7 @@ from typing import ClassVar
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.clockwork import dwell_boundary, dwell_index, in_turn
+from hybrid_model.consensus.clocks.intervals import dwell_boundary, dwell_index, in_turn
 from hybrid_model.consensus.laws.forecast import Forecast
 from hybrid_model.consensus.laws.threshold_triggers import EventGenerator
 from hybrid_model.consensus.scenario.trigger import Threshold

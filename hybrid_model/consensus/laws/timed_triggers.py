@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.clockwork import dwell_boundary, dwell_index
+from hybrid_model.consensus.clocks.intervals import dwell_boundary, dwell_index
 from hybrid_model.consensus.laws.threshold_triggers import EventGenerator
 from hybrid_model.consensus.scenario.trigger import Threshold
 from hybrid_model.declare.variables import Value

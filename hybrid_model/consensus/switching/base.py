@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.checks import ALWAYS
+from hybrid_model.consensus.clocks.over_time import OverTime
 from hybrid_model.declare.variables import Value
 
 __all__ = ["NoSwitching", "Switching", "SwitchingAutomaton", "masks", "validate_active"]
@@ -28,29 +28,15 @@ class SwitchingAutomaton(hm.HybridAutomaton):
         """The weights of the active edges."""
 
 
-class Switching(ABC):
+class Switching(OverTime):
     """Which edges may carry weight when."""
 
     edge_count: int
     """Number of edges of the network."""
 
-    @property
-    @abstractmethod
-    def period(self) -> float | None:
-        """A period [s]; 0.0 if nothing ever changes, None if there is none."""
-
-    @property
-    def domain(self) -> tuple[float, float]:
-        """First and last time [s] that the switching is given for."""
-        return ALWAYS
-
     @abstractmethod
     def phase(self, t: float) -> int:
         """Index, from 0, of the graph that is active at `t` [s]; at a switching instant, of the one that begins."""
-
-    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
-        """Switching instants strictly between `t0` and `t1` [s], ascending."""
-        return np.empty(0)
 
     @abstractmethod
     def active_at(self, t: float) -> NDArray[np.bool_]:
@@ -59,10 +45,6 @@ class Switching(ABC):
     @abstractmethod
     def automaton(self, edges: Sequence[int]) -> SwitchingAutomaton | None:
         """Make what lets through the weights of the active ones of `edges` (from 0); None if nothing is held back."""
-
-    def changes(self, end: float) -> Iterator[tuple[str, float]]:
-        """How often the graph changes up to the time `end` [s], and the key of the file that is to blame."""
-        yield from ()
 
 
 @dataclass(frozen=True)

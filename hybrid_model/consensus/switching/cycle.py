@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.clockwork import dwell_boundary, dwell_index, in_turn
+from hybrid_model.consensus.clocks.intervals import dwell_boundary, dwell_index, in_turn
 from hybrid_model.consensus.switching.base import Switching, SwitchingAutomaton, masks, validate_active
 from hybrid_model.declare.variables import Value
 
@@ -107,5 +107,5 @@ class SwitchingCycle(Switching):
         return PeriodicSwitching(dwell=self.dwell, active=masks(self.active, edges)) if edges else None
 
     def changes(self, end: float) -> Iterator[tuple[str, float]]:
-        """See `Switching.changes`."""
+        """See `OverTime.changes`."""
         yield "dwell", end / self.dwell

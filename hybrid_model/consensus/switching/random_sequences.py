@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import networkx as nx
 import numpy as np
 
-from hybrid_model.consensus.clocks.checks import require
+from hybrid_model.consensus.clocks.over_time import require
 from hybrid_model.consensus.graphs.connectivity import is_connected
 from hybrid_model.consensus.graphs.undirected import Edge
 from hybrid_model.consensus.messages import shown

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.checks import ALWAYS, require
-from hybrid_model.consensus.clocks.clockwork import in_turn
-from hybrid_model.consensus.clocks.row_clock import RowAutomaton, RowClock
+from hybrid_model.consensus.clocks.intervals import in_turn
+from hybrid_model.consensus.clocks.over_time import ALWAYS, require
+from hybrid_model.consensus.clocks.rows import RowAutomaton, RowClock
 from hybrid_model.consensus.switching.base import Switching, SwitchingAutomaton, masks, validate_active
 from hybrid_model.declare.variables import Value
 
@@ -124,6 +124,6 @@ class SwitchingSequence(Switching):
         return SequenceSwitching(starts=starts, period=period, active=masks(self.active, edges))
 
     def changes(self, end: float) -> Iterator[tuple[str, float]]:
-        """See `Switching.changes`."""
+        """See `OverTime.changes`."""
         if self.repeat:
             yield "duration or dwell", end / self.duration * len(self.dwells)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.checks import require
+from hybrid_model.consensus.clocks.over_time import require
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.weights.carriers import UnitCarrier
 from hybrid_model.consensus.weights.edge_automata import ForeseenWeights

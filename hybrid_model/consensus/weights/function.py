@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.checks import require
-from hybrid_model.consensus.clocks.clockwork import not_negative
-from hybrid_model.consensus.clocks.row_clock import RowAutomaton, RowClock, check_rows
+from hybrid_model.consensus.clocks.intervals import not_negative
+from hybrid_model.consensus.clocks.over_time import require
+from hybrid_model.consensus.clocks.rows import RowAutomaton, RowClock, check_rows
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 from hybrid_model.consensus.weights.primitive import Primitive

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.checks import require, require_phase
-from hybrid_model.consensus.clocks.clockwork import holding, is_odd
+from hybrid_model.consensus.clocks.intervals import holding, is_odd
+from hybrid_model.consensus.clocks.over_time import require, require_phase
 from hybrid_model.consensus.weights.carriers import Carrier
 from hybrid_model.consensus.weights.edge_automata import PIECE_EVENTS, ForeseenWeights
 from hybrid_model.declare.variables import Value

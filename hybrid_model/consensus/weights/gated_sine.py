@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.checks import require
-from hybrid_model.consensus.clocks.clockwork import half_wave, half_wave_boundary
+from hybrid_model.consensus.clocks.intervals import half_wave, half_wave_boundary
+from hybrid_model.consensus.clocks.over_time import require
 from hybrid_model.consensus.clocks.periods import common_period
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.weights.gate import Gate, GateClock, is_open

@@ -11,7 +11,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid_model.consensus.clocks.row_clock import RowClock, check_rows
+from hybrid_model.consensus.clocks.rows import RowClock, check_rows
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.weights.carriers import UnitCarrier
 from hybrid_model.consensus.weights.tabulated import TabulatedWeights
@@ -85,7 +85,7 @@ class PiecewiseWeight(Waveform):
         return self.amplitude(middles), np.zeros(len(begins))
 
     def changes(self, end: float) -> Iterator[tuple[str, float]]:
-        """See `Waveform.changes`."""
+        """See `OverTime.changes`."""
         if self.cycle is not None:
             yield "cycle", end / self.cycle * len(self.starts)
 

@@ -11,8 +11,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid_model.consensus.clocks.checks import ALWAYS
-from hybrid_model.consensus.clocks.row_clock import RowClock, check_rows, on_line
+from hybrid_model.consensus.clocks.over_time import ALWAYS
+from hybrid_model.consensus.clocks.rows import RowClock, check_rows, on_line
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.messages import shown
 from hybrid_model.consensus.weights.sample_files import read_samples
@@ -156,7 +156,7 @@ class SampledWeight(Waveform):
         return np.maximum(values, 0.0), slopes
 
     def changes(self, end: float) -> Iterator[tuple[str, float]]:
-        """See `Waveform.changes`."""
+        """See `OverTime.changes`."""
         if self.repeat:
             yield "times", end / (self.times[-1] - self.times[0]) * len(self.times)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.checks import require, require_phase
+from hybrid_model.consensus.clocks.over_time import require, require_phase
 from hybrid_model.consensus.weights.edge_automata import ForeseenWeights
 from hybrid_model.consensus.weights.waveform import Waveform
 from hybrid_model.declare.variables import Value

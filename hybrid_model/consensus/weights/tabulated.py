@@ -8,9 +8,9 @@ from typing import Any, Self
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.clockwork import in_turn
+from hybrid_model.consensus.clocks.intervals import in_turn
 from hybrid_model.consensus.clocks.periods import common_period
-from hybrid_model.consensus.clocks.row_clock import RowAutomaton, RowClock, on_line, row_begin
+from hybrid_model.consensus.clocks.rows import RowAutomaton, RowClock, on_line, row_begin
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 from hybrid_model.declare.variables import Value

@@ -1,7 +1,7 @@
 """What every weight of an edge offers, whatever its shape: the interface that integrals, bounds and exact flows use."""
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar
@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hybrid_model.consensus.clocks.checks import ALWAYS, require
+from hybrid_model.consensus.clocks.over_time import OverTime, require
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.weights.carriers import Carrier
@@ -18,7 +18,7 @@ from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 __all__ = ["Waveform", "each_edge", "require_values"]
 
 
-class Waveform(ABC):
+class Waveform(OverTime):
     """A weight ``w(t) = amplitude(t)*carrier(t) >= 0`` whose amplitude is constant between breakpoints.
 
     On a piece on which all edges share one carrier, the weighted Laplacian is a constant matrix times a scalar, and the
@@ -42,16 +42,6 @@ class Waveform(ABC):
     def automaton(self) -> type[EdgeAutomaton]:
         """The class of automata for edges with such weights."""
 
-    @property
-    @abstractmethod
-    def period(self) -> float | None:
-        """A period [s]; 0.0 for a constant, None if there is none."""
-
-    @property
-    def domain(self) -> tuple[float, float]:
-        """First and last time [s] that the weight is given for; outside it holds its first or last value."""
-        return ALWAYS
-
     @abstractmethod
     def amplitude(self, t: ArrayLike) -> NDArray[np.float64]:
         """The factor of the carrier at `t` [s], in the shape of `t`."""
@@ -61,17 +51,13 @@ class Waveform(ABC):
         time = np.asarray(t, dtype=float)
         return np.asarray(self.amplitude(time) * self.carrier.value(time))
 
-    def breakpoints(self, t0: float, t1: float) -> NDArray[np.float64]:
-        """Times strictly between `t0` and `t1` [s], ascending, at which the weight may jump or have a kink."""
-        return np.empty(0)
-
     def integral(self, t0: ArrayLike, t1: ArrayLike) -> NDArray[np.float64]:
         """Integral from `t0` to `t1` [s]; the two broadcast against each other. Here for an amplitude that stays."""
         carried = self.carrier.integral(np.asarray(t0, dtype=float), np.asarray(t1, dtype=float))
         return np.asarray(self.amplitude(0.0) * carried)
 
     def changes(self, end: float) -> Iterator[tuple[str, float]]:
-        """How often the weight changes up to the time `end` [s], and the key of the file that is to blame."""
+        """See `OverTime.changes`: each of the rates makes changes."""
         for key in self.numbers:
             if key.endswith("rate"):
                 yield key, end * (getattr(self, key) / (2 * math.pi))

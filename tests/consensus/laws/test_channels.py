@@ -7,34 +7,17 @@ import pytest
 from catalogue_triggers import RING
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from law_runs import compare, reported, reported_by_agents, run
 from oracles.exact_laws import law_run
 from random_scenarios import random_scenario
 
 import hybrid_model as hm
-from cosim.consensus import in_process_system, network_report
-from cosim.masters import run_event_exact
 from hybrid_model.consensus.laws.channels import link_seeds
-from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.channel import Channel
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
-from hybrid_model.native.compiled import compiled
 
-TIME_TOLERANCE = 1e-8
-STATE_TOLERANCE = 1e-9
-STATE_ERROR = 1e-11
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def run(scenario):
-    return hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
-
-
-def compare(report, exact):
-    assert report.events_per_agent == exact.counts
-    for times, expected, slope in zip(report.event_times, exact.event_times, exact.slopes, strict=True):
-        assert np.all(np.abs(times - expected) <= TIME_TOLERANCE + STATE_ERROR / np.maximum(slope, 1e-5))
-    np.testing.assert_allclose(report.x_end, exact.x_end, rtol=0, atol=STATE_TOLERANCE)
 
 
 def drawn(seed, **options):
@@ -60,8 +43,7 @@ def test_a_run_over_a_channel_is_the_exact_one(seed):
 @given(seed=SEEDS)
 def test_agents_that_meet_at_events_only_run_the_same(seed):
     scenario = drawn(seed, stop_time=2.0)
-    report = network_report(scenario, run_event_exact(in_process_system(scenario), scenario.stop_time))
-    compare(report, law_run(scenario))
+    compare(reported_by_agents(scenario), law_run(scenario))
 
 
 @pytest.mark.long
@@ -69,7 +51,7 @@ def test_agents_that_meet_at_events_only_run_the_same(seed):
 @given(seed=SEEDS)
 def test_a_run_over_a_channel_is_the_exact_one_in_many_cases(seed):
     scenario = drawn(seed)
-    compare(run_report(scenario, run(scenario)), law_run(scenario))
+    compare(reported(scenario), law_run(scenario))
 
 
 def lost_names(scenario):
@@ -163,7 +145,7 @@ def test_copies_stay_as_close_as_the_delay_allows():
 
 
 def test_without_delay_and_loss_the_mean_stays():
-    assert run_report(load_scenario("paper-a"), run(load_scenario("paper-a"))).mean_drift < 1e-12
+    assert reported(load_scenario("paper-a")).mean_drift < 1e-12
 
 
 def test_too_many_broadcasts_under_way_end_the_run_with_a_message():

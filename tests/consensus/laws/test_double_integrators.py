@@ -11,6 +11,7 @@ import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
+from hybrid_model.consensus.graphs.undirected import weighted_laplacian
 from hybrid_model.consensus.laws.double_integrators import (
     double_integrator_agents,
     double_integrator_loop,
@@ -33,10 +34,7 @@ def exact_events(scenario, velocities, damping):
     """Constant weights and threshold: between events positions are cubic, and ``|error|^2 = c^2`` has degree six."""
     network, c = scenario.network, scenario.trigger.threshold
     n = network.agents
-    laplacian = np.zeros((n, n))
-    for (i, j), wave in zip(network.edges, scenario.weights.waveforms, strict=True):
-        direction = np.eye(n)[i - 1] - np.eye(n)[j - 1]
-        laplacian += wave.level * np.outer(direction, direction)
+    laplacian = weighted_laplacian(network.agents, network.edges, [wave.level for wave in scenario.weights.waveforms])
     t, x, v = 0.0, np.array(network.initial, dtype=float), np.array(velocities, dtype=float)
     # Extrapolations, as values at the present time and slopes.
     model_x, model_v = x.copy(), v.copy()

@@ -1,20 +1,20 @@
 """Self-triggered broadcasting: the run is the event-triggered one, and the times are known in advance."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from catalogue_triggers import RING
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from law_runs import compare, reported, reported_by_agents, run
 from oracles.exact_consensus import exact_run
 from random_scenarios import random_scenario
 from scipy.optimize import brentq
 
 import hybrid_model as hm
-from cosim.consensus import in_process_system, network_report
-from cosim.masters import run_event_exact
-from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
+from hybrid_model.consensus.laws.closed_loop import scenario_agents
 from hybrid_model.consensus.laws.forecast import Forecast
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.runs.report import run_report
@@ -22,44 +22,32 @@ from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.consensus.scenario.trigger import Threshold, Trigger, TriggerKind
 from hybrid_model.consensus.weights.gated_sine import SineCarrier, WeightMap
 from hybrid_model.consensus.weights.sine import RippleCarrier
-from hybrid_model.native.compiled import compiled
 
-TIME_TOLERANCE = 1e-8
-STATE_TOLERANCE = 1e-9
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def run(scenario):
-    return hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
 
 
 def with_kind(scenario, kind):
     return replace(scenario, trigger=replace(scenario.trigger, kind=kind))
 
 
-def compare(scenario, report, exact):
-    assert report.events_per_agent == exact.counts
-    for times, expected in zip(report.event_times, exact.event_times, strict=True):
-        weights = np.array([scenario.edge_weights.value(t).max() for t in expected])
-        # Where all weights are nearly zero, a state error of 1e-13 moves an event by its quotient with the weight.
-        slack = np.where(weights > 0, 1e-13 / np.maximum(weights, 1e-8), 0.0)
-        assert np.all(np.abs(times - expected) <= TIME_TOLERANCE + slack)
-    np.testing.assert_allclose(report.x_end, exact.x_end, rtol=0, atol=STATE_TOLERANCE)
+def check(scenario, report, exact):
+    # Where all weights are nearly zero, a state error of 1e-13 moves an event by its quotient with the weight.
+    weights = [np.array([scenario.edge_weights.value(t).max() for t in times]) for times in exact.event_times]
+    compare(report, exact, [np.where(w > 0, 1e-13 / np.maximum(w, 1e-8), 0.0) for w in weights])
 
 
 @settings(max_examples=12, deadline=None)
 @given(seed=SEEDS)
 def test_the_run_is_the_exact_event_triggered_one(seed):
     scenario = random_scenario(seed, "self-triggered")
-    compare(scenario, run_report(scenario, run(scenario)), exact_run(with_kind(scenario, TriggerKind.DYNAMIC)))
+    check(scenario, reported(scenario), exact_run(with_kind(scenario, TriggerKind.DYNAMIC)))
 
 
 @settings(max_examples=4, deadline=None)
 @given(seed=SEEDS)
 def test_agents_that_meet_at_events_only_run_the_same(seed):
     scenario = random_scenario(seed, "self-triggered", stop_time=2.0)
-    report = network_report(scenario, run_event_exact(in_process_system(scenario), scenario.stop_time))
-    compare(scenario, report, exact_run(scenario))
+    check(scenario, reported_by_agents(scenario), exact_run(scenario))
 
 
 @pytest.mark.long
@@ -67,24 +55,20 @@ def test_agents_that_meet_at_events_only_run_the_same(seed):
 @given(seed=SEEDS)
 def test_the_run_is_the_exact_event_triggered_one_in_many_cases(seed):
     scenario = random_scenario(seed, "self-triggered")
-    compare(scenario, run_report(scenario, run(scenario)), exact_run(with_kind(scenario, TriggerKind.DYNAMIC)))
+    check(scenario, reported(scenario), exact_run(with_kind(scenario, TriggerKind.DYNAMIC)))
 
 
 @pytest.mark.parametrize("trigger", [Trigger(TriggerKind.STATIC, 0.5), Trigger(TriggerKind.DYNAMIC, 0.5, 0.06)])
 def test_the_paper_s_example_is_broadcast_for_broadcast_the_same(trigger):
     scenario = replace(load_scenario("paper-a"), trigger=trigger)
     ahead = replace(scenario, trigger=replace(trigger, kind=TriggerKind.SELF_TRIGGERED))
-    compare(scenario, run_report(ahead, run(ahead)), run_report_as_exact(scenario))
+    check(scenario, reported(ahead), reported_as_exact(scenario))
 
 
-def run_report_as_exact(scenario):
+def reported_as_exact(scenario):
     """The event-triggered run in the place of the exact one."""
-    report = run_report(scenario, run(scenario))
-
-    class Exact:
-        counts, event_times, x_end = report.events_per_agent, report.event_times, report.x_end
-
-    return Exact
+    report = reported(scenario)
+    return SimpleNamespace(counts=report.events_per_agent, event_times=report.event_times, x_end=report.x_end)
 
 
 def test_over_sine_weights_too():
@@ -101,9 +85,9 @@ def test_over_sine_weights_too():
     }
     scenario = read_scenario(entries)
     ahead = with_kind(scenario, TriggerKind.SELF_TRIGGERED)
-    report = run_report(ahead, run(ahead))
+    report = reported(ahead)
     assert sum(report.events_per_agent) > 5
-    compare(scenario, report, run_report_as_exact(scenario))
+    check(scenario, report, reported_as_exact(scenario))
 
 
 def test_a_broadcast_comes_at_the_time_that_was_computed_and_with_the_error_that_was_predicted():

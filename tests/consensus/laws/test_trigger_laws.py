@@ -7,68 +7,49 @@ import pytest
 from catalogue_triggers import RING
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from law_runs import compare, reported, reported_by_agents, run
 from oracles.exact_consensus import exact_run
 from oracles.exact_laws import law_run
 from random_scenarios import random_scenario
 from scipy.optimize import brentq
 
 import hybrid_model as hm
-from cosim.consensus import in_process_system, network_report
-from cosim.masters import run_event_exact
-from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
+from hybrid_model.consensus.laws.closed_loop import agent_name
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.native.compiled import compiled
 
-# The limits of the agreement of executions. Events amplify errors, so random runs are short.
-TIME_TOLERANCE = 1e-8
-STATE_TOLERANCE = 1e-9
-STATE_ERROR = 1e-11
-"""What integration and rounding leave in a margin: it moves an event by its quotient with the margin's slope."""
-
-WITH_MARGIN = ["relative", "girard", "sampled", "periodic"]
+KINDS = pytest.mark.parametrize("kind", ["mixed", "relative", "girard", "sampled", "periodic"])
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def run(scenario):
-    return hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+def exact(scenario):
+    return exact_run(scenario) if scenario.trigger.kind is TriggerKind.MIXED else law_run(scenario)
 
 
-def compare(report, exact):
-    assert report.events_per_agent == exact.counts
-    slopes = getattr(exact, "slopes", [np.full(len(times), 1.0) for times in exact.event_times])
-    for times, expected, slope in zip(report.event_times, exact.event_times, slopes, strict=True):
-        assert np.all(np.abs(times - expected) <= TIME_TOLERANCE + STATE_ERROR / np.maximum(slope, 1e-5))
-    np.testing.assert_allclose(report.x_end, exact.x_end, rtol=0, atol=STATE_TOLERANCE)
-
-
-@pytest.mark.parametrize("kind", ["mixed", *WITH_MARGIN])
+@KINDS
 @settings(max_examples=8, deadline=None)
 @given(seed=SEEDS)
 def test_a_law_runs_like_the_exact_solution(kind, seed):
     scenario = random_scenario(seed, kind)
-    exact = exact_run(scenario) if kind == "mixed" else law_run(scenario)
-    compare(run_report(scenario, run(scenario)), exact)
+    compare(reported(scenario), exact(scenario))
 
 
-@pytest.mark.parametrize("kind", ["mixed", *WITH_MARGIN])
+@KINDS
 @settings(max_examples=4, deadline=None)
 @given(seed=SEEDS)
 def test_a_law_runs_agent_by_agent_like_the_exact_solution(kind, seed):
     scenario = random_scenario(seed, kind, stop_time=2.0)
-    exact = exact_run(scenario) if kind == "mixed" else law_run(scenario)
-    compare(network_report(scenario, run_event_exact(in_process_system(scenario), scenario.stop_time)), exact)
+    compare(reported_by_agents(scenario), exact(scenario))
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("kind", ["mixed", *WITH_MARGIN])
+@KINDS
 @settings(max_examples=400, deadline=None)
 @given(seed=SEEDS)
 def test_a_law_runs_like_the_exact_solution_in_many_cases(kind, seed):
     scenario = random_scenario(seed, kind)
-    exact = exact_run(scenario) if kind == "mixed" else law_run(scenario)
-    compare(run_report(scenario, run(scenario)), exact)
+    compare(reported(scenario), exact(scenario))
 
 
 def two_agents(trigger, difference=1.0, stop_time=3.0):
@@ -100,7 +81,7 @@ class TestMixed:
             events.append(event)
             difference -= 2 * difference * (event - start)
             start = event
-        report = run_report(scenario, run(scenario))
+        report = reported(scenario)
         assert len(events) > 1
         for times in report.event_times:
             np.testing.assert_allclose(times, events, rtol=0, atol=1e-11)  # rounding of states over slopes of about 0.1
@@ -126,7 +107,7 @@ class TestRelative:
             t += step
             events.append(t)
             difference *= 1 - 2 * step
-        report = run_report(scenario, run(scenario))
+        report = reported(scenario)
         assert len(events) > 2
         for times in report.event_times:
             np.testing.assert_allclose(times, events, rtol=1e-10)
@@ -139,7 +120,7 @@ class TestRelative:
 
     def test_while_no_edge_carries_weight_it_does_not_fire(self):
         scenario = replace(load_scenario("paper-a"), trigger=Trigger(TriggerKind.RELATIVE, sigma=0.5, floor=1e-6))
-        report = run_report(scenario, run(scenario))
+        report = reported(scenario)
         for i, times in enumerate(report.event_times, start=1):
             own = [k for k, edge in enumerate(scenario.network.edges) if i in edge]
             weights = np.array([scenario.edge_weights.value(t)[own].sum() for t in times])
@@ -183,7 +164,7 @@ class TestGirard:
             step = brentq(margin, 0.0, scenario.stop_time - t, xtol=1e-15)
             t, eta, d = t + step, reserve_after(step, d, eta), d * (1 - 2 * step)
             events.append(t)
-        report = run_report(scenario, run(scenario))
+        report = reported(scenario)
         assert len(events) > 2
         for times in report.event_times:
             np.testing.assert_allclose(times, events, rtol=0, atol=1e-9)  # the solver's relative tolerance of 1e-10
@@ -196,10 +177,10 @@ class TestGirard:
         events is ill-conditioned: steps of 2e-5 s give 35 and 46."""
         trigger = Trigger(TriggerKind.GIRARD, sigma=0.5, theta=1.0, leak=leak, reserve=0.25)
         scenario = replace(load_scenario("paper-a"), trigger=trigger)
-        report, exact = run_report(scenario, run(scenario)), law_run(scenario)
-        assert report.events_per_agent == exact.counts == counts
+        report, expected = reported(scenario), law_run(scenario)
+        assert report.events_per_agent == expected.counts == counts
         assert report.edge_norm_end == pytest.approx(edge_norm, abs=5e-7)
-        compare(report, exact)
+        compare(report, expected)
 
     def test_the_reserve_stays_positive_and_the_sum_with_the_disagreement_falls(self):
         trigger = Trigger(TriggerKind.GIRARD, sigma=0.5, theta=2.0, leak=0.1, reserve=0.25)
@@ -214,7 +195,7 @@ class TestGirard:
 class TestTimed:
     def test_checks_are_at_multiples_of_the_period_only(self):
         scenario = replace(load_scenario("paper-a"), trigger=Trigger(TriggerKind.SAMPLED, 0.4, 0.06, period=0.11))
-        report = run_report(scenario, run(scenario))
+        report = reported(scenario)
         events = np.concatenate(report.event_times)
         assert len(events) > 10
         np.testing.assert_allclose(events / 0.11, np.round(events / 0.11), rtol=0, atol=1e-9)
@@ -222,27 +203,27 @@ class TestTimed:
     def test_fine_checks_approach_the_event_triggered_run(self):
         # A check comes at most one period after the crossing.
         static = replace(read_scenario(RING), stop_time=1.0)
-        exact = exact_run(static)
+        exact_events = exact_run(static)
         period = 1e-3
         sampled = Trigger(TriggerKind.SAMPLED, static.trigger.threshold, period=period)
         report = run_report(static, run(replace(static, trigger=sampled)))
-        assert report.events_per_agent == exact.counts
-        assert sum(exact.counts) > 2
-        for times, expected in zip(report.event_times, exact.event_times, strict=True):
+        assert report.events_per_agent == exact_events.counts
+        assert sum(exact_events.counts) > 2
+        for times, expected in zip(report.event_times, exact_events.event_times, strict=True):
             # Each event is late by a period, and is shifted by the lateness of those before it.
             assert np.all(np.abs(times - expected) <= 20 * period)
 
     def test_periodic_broadcasts_of_two_agents_by_hand(self):
         # Each broadcast multiplies the difference by 1 - 2 h.
         scenario = two_agents({"kind": "periodic", "period": 0.3}, stop_time=2.9)
-        report = run_report(scenario, run(scenario))
+        report = reported(scenario)
         for times in report.event_times:
             np.testing.assert_allclose(times, 0.3 * np.arange(1, 10), rtol=1e-15)
         assert np.diff(report.x_end)[0] == pytest.approx(0.4**9 * (1 - 2 * 0.2), rel=1e-9)
 
     def test_continuous_agents_follow_the_matrix_exponential(self):
         scenario = two_agents({"kind": "continuous"})
-        report = run_report(scenario, run(scenario))
+        report = reported(scenario)
         assert report.events_per_agent == [0, 0]
         np.testing.assert_allclose(report.x_end, 0.5 + np.array([-0.5, 0.5]) * np.exp(-6.0), rtol=0, atol=1e-9)
 
@@ -260,7 +241,7 @@ class TestTimed:
             integral = 2 * (piece.end - piece.start) - (np.sin(10 * piece.end) - np.sin(10 * piece.start)) / 5
             values, vectors = np.linalg.eigh(laplacian)
             x = vectors @ (np.exp(-values * integral) * (vectors.T @ x))
-        np.testing.assert_allclose(run_report(scenario, run(scenario)).x_end, x, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(reported(scenario).x_end, x, rtol=0, atol=1e-8)
 
 
 def states(arc):

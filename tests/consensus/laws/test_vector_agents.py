@@ -11,6 +11,7 @@ import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
+from hybrid_model.consensus.graphs.undirected import weighted_laplacian
 from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop, vector_wires
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.channel import Channel
@@ -28,10 +29,7 @@ def run(scenario, initial):
 def exact_events(scenario, initial):
     """Constant weights and threshold: errors are straight lines, and ``|e + r s| = c`` is a quadratic equation."""
     network, c = scenario.network, scenario.trigger.threshold
-    laplacian = np.zeros((network.agents, network.agents))
-    for (i, j), wave in zip(network.edges, scenario.weights.waveforms, strict=True):
-        direction = np.eye(network.agents)[i - 1] - np.eye(network.agents)[j - 1]
-        laplacian += wave.level * np.outer(direction, direction)
+    laplacian = weighted_laplacian(network.agents, network.edges, [wave.level for wave in scenario.weights.waveforms])
     t, x = 0.0, np.array(initial, dtype=float)
     sent, events = x.copy(), [[] for _ in x]
     while True:

@@ -86,43 +86,6 @@ class TestWeights:
         assert made.weights.kind is WeightKind.FUNCTION
         assert len(closed_loop(made).parts) == 3
 
-    @pytest.mark.parametrize(
-        ("content", "message"),
-        [
-            ("1,2\n", "times lists 1 samples; there must be at least 2"),
-            ("", "holds no rows of numbers"),
-            ("t,w\n0,1\nx,2\n", r"has no numbers in row 3: \['x', '2'\]"),
-            ("0,1\n1,2,3\n", "has 3 cells in row 2"),
-            ("0\n1\n", "has 1 cells in row 1"),
-            ("0,1,1,1\n1,1,1,1\n", "has weights for 3 edges, but the network has 2"),
-            ("0,1\n0,1\n", r"times\[2\] is 0.0; it must be later"),
-            ("0,1\n20,-1\n", r"of edge 1: values\[2\] is -1.0; it must not be negative"),
-            ("0,1\n9,1\n", r"\[weights\] of edge 1 is given from 0 s to 9 s, but the run goes from 0 s to 10 s"),
-        ],
-    )
-    def test_refused_files(self, tmp_path, content, message):
-        (tmp_path / "w.csv").write_text(content)
-        with pytest.raises(ScenarioError, match=message):
-            read_scenario(BASE | {"weights": {"kind": "sampled", "file": "w.csv"}}, tmp_path)
-
-    def test_files_that_are_no_samples(self, tmp_path):
-        def read(name):
-            return read_scenario(BASE | {"weights": {"kind": "sampled", "file": name}}, tmp_path)
-
-        (tmp_path / "w.txt").write_text("0,1")
-        (tmp_path / "w.npz").write_bytes(b"no archive")
-        np.savez(tmp_path / "v.npz", t=[0.0, 20.0])
-        np.savez(tmp_path / "u.npz", t=[0.0, 20.0], w=[1.0, 2.0, 3.0])
-        for name, message in (
-            ("absent.csv", "absent.csv cannot be read: No such file"),
-            ("w.txt", "ends in '.txt'; it must be a .csv or .npz file"),
-            ("w.npz", "w.npz is not an npz file of numbers"),
-            ("v.npz", "has no array 'w'; it must hold 't' and 'w'"),
-            ("u.npz", r"has 't' of shape \(2,\) and 'w' of shape \(3,\)"),
-        ):
-            with pytest.raises(ScenarioError, match=message):
-                read(name)
-
 
 class TestSwitching:
     def test_the_kind_may_be_left_out_or_said(self):
@@ -179,7 +142,6 @@ class TestSwitching:
         ),
         ("weights", {"kind": "sampled", "times": [1, 20], "values": [1, 1]}, "is given from 1 s to 20 s"),
         ("switching", {"kind": "sequnce"}, r"kind is 'sequnce'; .*Did you mean 'sequence'\?"),
-        ("switching", {"kind": "sequence", "dwell": [1], "active": [[1], [2]]}, "dwell lists 1 numbers for 2 graphs"),
         (
             "switching",
             {"kind": "sequence", "dwell": [1, 2], "active": [[1], [2]]},

@@ -189,7 +189,7 @@ class TestValues:
         ("network.edges", [[1, 2], 3], r"edges\[2\] is 3; it must be a list of whole numbers"),
         ("network.edges", [[1, 2], [2, 3.0]], r"edges\[2\]\[2\] is 3.0; it must be a whole number"),
         ("network.edges", [[1, 2], [2, 4]], "edge 2 .* names agent 4; agents are numbered from 1 to 3"),
-        ("network.edges", [[1, 2], [2, 2]], "edge 2 .* a self-loop"),
+        ("network.edges", [[1, 2], [2, 2]], r"\[network\] edges: edge 2 is \[2, 2\], a self-loop"),
         ("network.edges", [[1, 2], [2, 1]], "edge 2 .* repeats edge 1"),
         ("network.initial", [1.0, 2.0], "initial lists 2 numbers for 3 agents"),
         ("network.initial", [1.0, math.nan, 0.0], r"initial\[2\] is nan; it must be a finite number"),

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import hybrid_model as hm
-from hybrid_model.consensus.clocks.checks import require
-from hybrid_model.consensus.clocks.clockwork import holding, in_turn, not_negative
+from hybrid_model.consensus.clocks.intervals import holding, in_turn, not_negative
+from hybrid_model.consensus.clocks.over_time import require
 from hybrid_model.declare.variables import Value
 
 __all__ = ["RowAutomaton", "RowClock", "check_rows", "on_line", "row_begin", "row_number"]
