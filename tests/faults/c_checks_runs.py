@@ -10,7 +10,7 @@ from c_runs import (
     Exchange,
     Witness,
     agree,
-    co_simulation,
+    agree_in_all_ways,
     jumps_of,
     model_exchange,
     only,
@@ -53,23 +53,10 @@ MORE = {
 }
 
 
-def all_ways(witness, start, fmi):
-    arc = python_run(witness)
-    harness = start(witness.automaton, fmi)
-    agree(witness, arc, co_simulation(harness, witness, events=fmi == "3.0"))
-    agree(witness, arc, co_simulation(harness, witness, events=False, early=False, stop=False))
-    if fmi == "2.0":
-        agree(witness, arc, co_simulation(harness, witness, events=False, stop_at_events=True))
-    else:
-        agree(witness, arc, co_simulation(harness, witness, early=False))
-        agree(witness, arc, co_simulation(harness, witness, update=1))
-        agree(witness, arc, co_simulation(harness, witness, events=False, update=2))
-
-
 def check_co_simulation(start):
     for witness in [*WITNESSES.values(), *MORE.values()]:
         for fmi in VERSIONS:
-            all_ways(witness, start, fmi)
+            agree_in_all_ways(witness, start(witness.automaton, fmi), fmi)
 
 
 def check_exchange(start):
@@ -399,7 +386,7 @@ def check_ends(start):
 def check_flow_priority(start):
     witness = Witness(FlowFirst(rate=1.3, name="quick"), 5.0, 7)
     for fmi in VERSIONS:
-        all_ways(witness, start, fmi)
+        agree_in_all_ways(witness, start(witness.automaton, fmi), fmi)
 
 
 def check_derivatives(start):

@@ -214,6 +214,18 @@ class Exchange:
                 self.settle()
 
 
+def agree_in_all_ways(witness, harness, fmi):
+    """Each use of Co-Simulation that a version has gives the run of the automaton."""
+    arc = python_run(witness)
+    uses = [{"events": fmi == "3.0"}, {"events": False, "early": False, "stop": False}]
+    if fmi == "2.0":
+        uses += [{"events": False, "stop_at_events": True}]
+    else:
+        uses += [{"early": False}, {"update": 1}, {"events": False, "update": 2}]
+    for use in uses:
+        agree(witness, arc, co_simulation(harness, witness, **use))
+
+
 def model_exchange(harness, witness, *, slot=0):
     """By an integrator of our own."""
     names, exchange = watched(harness), Exchange(harness, witness, slot)

@@ -2,7 +2,7 @@
 
 import pytest
 from c_harness import VERSIONS
-from c_runs import agree, co_simulation, model_exchange, python_run
+from c_runs import agree, agree_in_all_ways, model_exchange, python_run
 from c_witnesses import POLYNOMIAL, WITNESSES
 
 pytestmark = pytest.mark.faults
@@ -12,16 +12,7 @@ pytestmark = pytest.mark.faults
 @pytest.mark.parametrize("name", WITNESSES)
 def test_co_simulation(name, fmi, started):
     witness = WITNESSES[name]
-    arc = python_run(witness)
-    harness = started(witness.automaton, fmi, "addresses")
-    agree(witness, arc, co_simulation(harness, witness, events=fmi == "3.0"))
-    agree(witness, arc, co_simulation(harness, witness, events=False, early=False, stop=False))
-    if fmi == "2.0":
-        agree(witness, arc, co_simulation(harness, witness, events=False, stop_at_events=True))
-    else:
-        agree(witness, arc, co_simulation(harness, witness, early=False))
-        agree(witness, arc, co_simulation(harness, witness, update=1))
-        agree(witness, arc, co_simulation(harness, witness, events=False, update=2))
+    agree_in_all_ways(witness, started(witness.automaton, fmi, "addresses"), fmi)
 
 
 @pytest.mark.parametrize("fmi", VERSIONS)

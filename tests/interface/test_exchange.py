@@ -101,10 +101,8 @@ def test_where_flow_has_priority_a_border_of_both_sets_is_reached_a_little_befor
     component = exchanging(PatientBall, fmi)
     component.begin()
     t = np.sqrt(2.0 / 9.81) - ahead
-    component.do("SetTime", c.c_double(t))
-    component.do("SetContinuousStates", doubles([1.0 - 9.81 / 2 * t**2, -9.81 * t]), c.c_size_t(2))
-    component.do("EnterEventMode")
-    component.settle()
+    component.be_at(t, [1.0 - 9.81 / 2 * t**2, -9.81 * t])
+    component.handle_event()
     assert len(component.jumps) == n
 
 
@@ -113,10 +111,8 @@ def test_an_importer_that_stops_far_before_a_guard_finds_nothing_there(fmi, exch
     component = exchanging(Ramps, fmi)
     component.begin(limit_a=0.3)
     for ahead, n in ((1e-6, 0), (1e-8, 0), (2e-10, 1)):
-        component.do("SetTime", c.c_double(0.3 - ahead))
-        component.do("SetContinuousStates", doubles([0.3 - ahead, 0.1]), c.c_size_t(2))
-        component.do("EnterEventMode")
-        component.settle()
+        component.be_at(0.3 - ahead, [0.3 - ahead, 0.1])
+        component.handle_event()
         assert len(component.jumps) == n
 
 
@@ -141,8 +137,7 @@ def test_time_events_are_announced_at_their_exact_times(fmi, exchanging):
         assert update.next_time == 0.45 + k * 0.1
         # An importer's own arithmetic may come out beside it by a rounding.
         component.do("SetTime", c.c_double(update.next_time - (k % 3) * math.ulp(update.next_time)))
-        component.do("EnterEventMode")
-        update = component.settle()
+        update = component.handle_event()
     assert [name for name, _ in component.jumps] == ["timer"] * 40
     assert component.get("rounds") == 40
 
@@ -155,8 +150,7 @@ def test_states_count_as_changed_only_where_a_jump_gives_them_another_value(fmi,
     for _ in range(3):
         component.do("SetTime", c.c_double(update.next_time))
         before = component.vector("GetContinuousStates", 2)[1]
-        component.do("EnterEventMode")
-        update = component.settle()
+        update = component.handle_event()
         told[round(component.get("time"), 9)] = update.states_changed
         assert update.states_changed == (component.vector("GetContinuousStates", 2)[1] != before)
     # The switch of 0.3 and 0.6 s changes the speed of the flow, the timer of 0.45 s a state.
@@ -171,8 +165,7 @@ def test_breakpoints_of_the_flow_are_announced_too(fmi, exchanging):
     while update.next_time < 1.0:
         found.append(update.next_time)
         component.do("SetTime", c.c_double(update.next_time))
-        component.do("EnterEventMode")
-        update = component.settle()
+        update = component.handle_event()
     # 3 * 0.3 and 2 * 0.45 differ by a rounding: that is one time.
     assert found == [0.3, 0.45, 0.6, 0.9]
 
@@ -235,16 +228,13 @@ def test_an_event_leaves_no_indicator_that_asks_for_another(fmi, exchanging):
     """After an event the guards are on their other side; entering Event Mode once more changes nothing."""
     component = exchanging(Ramps, fmi)
     component.begin(limit_a=0.3)
-    component.do("SetTime", c.c_double(0.3))
-    component.do("SetContinuousStates", doubles([0.3, 0.3]), c.c_size_t(2))
+    component.be_at(0.3, [0.3, 0.3])
     assert component.completed() == (OK, True, False)
-    component.do("EnterEventMode")
-    component.settle()
+    component.handle_event()
     assert component.vector("GetEventIndicators", 2)[1][0] == pytest.approx(-0.3)
     assert component.completed() == (OK, False, False)
     before = component.values()
-    component.do("EnterEventMode")
-    component.settle()
+    component.handle_event()
     assert component.values() == before
     assert len(component.jumps) == 1
 

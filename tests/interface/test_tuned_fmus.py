@@ -80,8 +80,7 @@ def test_co_simulation_gives_the_run_in_closed_form(way, model, make):
             assert made.status == OK, component.log
             t = made.time
             if made.event and component.events:
-                component.do("EnterEventMode")
-                update = component.settle()
+                update = component.handle_event()
         if end in POINTS:
             check_values(component, end)
     check_jumps(component.jumps)

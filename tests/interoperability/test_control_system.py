@@ -4,6 +4,7 @@ import control
 import numpy as np
 import pytest
 from catalogue import cases
+from small_automata import Store
 
 import hybrid_model as hm
 from cosim.flow_functions import FlowError, FlowFunctions
@@ -140,13 +141,6 @@ def test_python_control_simulates_the_fmu_as_the_python_run_does(flow):
 @pytest.mark.parametrize("fmi", VERSIONS)
 def test_a_late_pulse_in_a_table_of_inputs_needs_a_bound_on_steps(fmi, exported):
     """As docs/interoperability.md says it."""
-
-    class Store(hm.HybridAutomaton):
-        x = hm.State(0.0, output=True)
-        u = hm.Input(0.0)
-
-        def flow_map(self, s):
-            return {"x": s.u}
 
     times = np.arange(101.0)
     pulse = np.where(times == 50.0, 1.0, 0.0)  # a triangle of area 1

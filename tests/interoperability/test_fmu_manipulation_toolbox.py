@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from catalogue import cases
 from executions import reference, shown
+from small_automata import Blinking, Listening
 
 import hybrid_model as hm
 from fmu.export import export_fmu
@@ -22,32 +23,6 @@ operations = pytest.importorskip("fmu_manipulation_toolbox.operations", reason=r
 
 STATE_TOLERANCE = 1e-8
 VERSIONS = ["2.0", "3.0"]
-
-
-class Blinking(hm.HybridAutomaton):
-    """Sends 1 and -1 in turn, each 0.25 s long."""
-
-    sent = hm.DiscreteState(1.0, output=True)
-    k = hm.DiscreteState(1, integer=True)
-
-    def next_time(self, s):
-        return 0.25 * s.k
-
-    def turn(self, s):
-        return {"sent": -s.sent, "k": s.k + 1}
-
-    transitions = (hm.TimeEvent("turn", next_time, turn),)
-
-
-class Sampled(hm.HybridAutomaton):
-    """Holds its input, and follows it with a delay."""
-
-    heard = hm.Input(0.0, discrete=True)
-    gain = hm.Parameter(1.0)
-    x = hm.State(0.0, output=True)
-
-    def flow_map(self, s):
-        return {"x": s.gain * (s.heard - s.x)}
 
 
 def container(folder, paths, fmi):
@@ -128,7 +103,7 @@ def test_signals_between_our_fmus_in_a_container(versions, fmi, sequential, alon
 
     In sequential mode at once, if the FMUs are listed along the links.
     """
-    sender, receiver = exported(Blinking(), "blinking", versions[0]), exported(Sampled(), "sampled", versions[1])
+    sender, receiver = exported(Blinking(), "blinking", versions[0]), exported(Listening(), "listening", versions[1])
     made = container(tmp_path, [sender, receiver] if along else [receiver, sender], fmi)
     made.add_link(sender.name, "sent", receiver.name, "heard")
     made.add_output(sender.name, "sent", "sent")

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from catalogue import cases
 from executions import reference
+from small_automata import Blinking, Listening
 
 import hybrid_model as hm
 from hybrid_model.models import BouncingBall
@@ -83,35 +84,10 @@ def test_models_without_inputs_are_the_python_run(name, exported):
                 assert abs(simulation.get("block", output) - arc.at(output, t)) < STATE_TOLERANCE, (output, t)
 
 
-class Sampled(hm.HybridAutomaton):
-    """Holds its input, and follows it with a delay: what it receives comes at communication points only."""
-
-    heard = hm.Input(0.0, discrete=True)
-    x = hm.State(0.0, output=True)
-
-    def flow_map(self, s):
-        return {"x": s.heard - s.x}
-
-
-class Blinking(hm.HybridAutomaton):
-    """Sends 1 and -1 in turn, each 0.25 s long."""
-
-    sent = hm.DiscreteState(1.0, output=True)
-    k = hm.DiscreteState(1, integer=True)
-
-    def next_time(self, s):
-        return 0.25 * s.k
-
-    def turn(self, s):
-        return {"sent": -s.sent, "k": s.k + 1}
-
-    transitions = (hm.TimeEvent("turn", next_time, turn),)
-
-
 def test_signals_travel_between_our_fmus_one_step_late(exported):
     """libcosim hands outputs over at the end of a step; the receiver's state then follows in closed form."""
     simulation = Simulation(
-        {"sender": exported(Blinking(), "blinking", "2.0"), "receiver": exported(Sampled(), "sampled", "2.0")}
+        {"sender": exported(Blinking(), "blinking", "2.0"), "receiver": exported(Listening(), "listening", "2.0")}
     )
     simulation.connect("sender", "sent", "receiver", "heard")
     x, heard = 0.0, 1.0

@@ -9,6 +9,7 @@ import pytest
 from catalogue import control_plant_under_triggers
 from scipy.linalg import expm
 from scipy.optimize import brentq
+from small_automata import Store
 
 import hybrid_model as hm
 from hybrid_model.linear import flow_system, linearise, lti
@@ -96,13 +97,6 @@ def test_unknown_names_are_answered_with_the_known_ones():
         control.input_output_response(flow_system(Pendulum()), [0.0, 1.0], 0.0, [0.0, 0.0], params={"damp": 1.0})
 
     def test_a_late_pulse_in_a_table_of_inputs_needs_a_bound_on_steps(self):
-        class Store(hm.HybridAutomaton):
-            x = hm.State(0.0, output=True)
-            u = hm.Input(0.0)
-
-            def flow_map(self, s):
-                return {"x": s.u}
-
         times = np.arange(101.0)
         pulse = np.where(times == 50.0, 1.0, 0.0)  # a triangle of area 1
         response = control.input_output_response(

@@ -4,19 +4,9 @@ import math
 
 import numpy as np
 import pytest
-from small_automata import Timer
+from small_automata import Store, Timer
 
 import hybrid_model as hm
-
-
-class Follower(hm.HybridAutomaton):
-    """Integrates an input."""
-
-    x = hm.State(0.0, output=True)
-    u = hm.Input(0.0)
-
-    def flow_map(self, s):
-        return {"x": s.u}
 
 
 class SquareWave(hm.HybridAutomaton):
@@ -90,7 +80,7 @@ def test_time_events_a_few_ulps_apart(gap):
 
 def test_an_input_with_breakpoints_is_integrated_exactly():
     signal = hm.Signal(lambda t: 1.0 if t < 0.3 else (-2.0 if t < 0.7 else 5.0), breakpoints=[0.7, 0.3])
-    arc = hm.simulate(Follower(), 1.0, inputs={"u": signal})
+    arc = hm.simulate(Store(), 1.0, inputs={"u": signal})
     # 0.3 - 0.8 + 1.5 = 1; a step across a breakpoint would be wrong by the step error of a jump, far above 1e-14.
     assert arc.end.x == pytest.approx(1.0, abs=1e-14)
     assert arc.at("x", [0.3, 0.7]) == pytest.approx([0.3, -0.5], abs=1e-14)
@@ -99,12 +89,12 @@ def test_an_input_with_breakpoints_is_integrated_exactly():
 @pytest.mark.parametrize("breakpoint", [0.0, 1.0])
 def test_breakpoints_at_the_start_and_at_the_end(breakpoint):
     signal = hm.Signal(lambda t: 2.0 if t < breakpoint else 3.0, breakpoints=[breakpoint])
-    arc = hm.simulate(Follower(), 1.0, inputs={"u": signal})
+    arc = hm.simulate(Store(), 1.0, inputs={"u": signal})
     assert arc.end.x == pytest.approx(3.0 if breakpoint == 0.0 else 2.0, abs=1e-14)
 
 
 def test_a_breakpoint_that_enables_a_guard_fires_it_at_the_breakpoint():
-    class Watcher(Follower):
+    class Watcher(Store):
         armed = hm.DiscreteState(1)
 
         def jump_set(self, s):
@@ -128,7 +118,7 @@ def test_a_time_event_that_does_not_move_on_is_an_error_that_names_it():
 
 
 def test_a_smooth_input_is_a_function_of_time():
-    arc = hm.simulate(Follower(), 2.0, inputs={"u": math.cos})
+    arc = hm.simulate(Store(), 2.0, inputs={"u": math.cos})
     assert arc.end.x == pytest.approx(math.sin(2.0), abs=1e-12)
 
 

@@ -103,3 +103,39 @@ class PatientCorridor(Corridor):
     """The same under flow priority."""
 
     priority = hm.Priority.FLOW
+
+
+class Store(hm.HybridAutomaton):
+    """Integrates an input."""
+
+    x = hm.State(0.0, output=True)
+    u = hm.Input(0.0)
+
+    def flow_map(self, s):
+        return {"x": s.u}
+
+
+class Blinking(hm.HybridAutomaton):
+    """Sends 1 and -1 in turn, each 0.25 s long."""
+
+    sent = hm.DiscreteState(1.0, output=True)
+    k = hm.DiscreteState(1, integer=True)
+
+    def next_time(self, s):
+        return 0.25 * s.k
+
+    def turn(self, s):
+        return {"sent": -s.sent, "k": s.k + 1}
+
+    transitions = (hm.TimeEvent("turn", next_time, turn),)
+
+
+class Listening(hm.HybridAutomaton):
+    """Holds what it hears, which comes at communication points only, and follows it with a delay."""
+
+    heard = hm.Input(0.0, discrete=True)
+    gain = hm.Parameter(1.0)
+    x = hm.State(0.0, output=True)
+
+    def flow_map(self, s):
+        return {"x": s.gain * (s.heard - s.x)}

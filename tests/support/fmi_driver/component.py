@@ -224,6 +224,11 @@ class Component:
             self.do("EnterStepMode" if self.kind == "cs" else "EnterContinuousTimeMode")
         return update
 
+    def handle_event(self):
+        """Into Event Mode and through it, as `settle`."""
+        self.do("EnterEventMode")
+        return self.settle()
+
     def step(self, t, h):
         point, size = c.c_double(t), c.c_double(h)
         if self.binary.version == 3:
@@ -306,6 +311,10 @@ class Component:
         return references([self.binary.reference(name) for name in names]), c.c_size_t(len(names))
 
     # Model Exchange.
+
+    def be_at(self, t, x):
+        self.do("SetTime", c.c_double(t))
+        self.do("SetContinuousStates", doubles(x), c.c_size_t(len(x)))
 
     def vector(self, function, n):
         """A getter of a vector: the status and the values."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fmi_driver.binary import OK, doubles
+from fmi_driver.binary import OK
 
 STEP = 2e-3
 """Classical Runge-Kutta steps: an error of about 1e-11 in a second for flows of frequency 7 and below."""
@@ -45,10 +45,10 @@ class Exchange:
         self.t, self.update = 0.0, None
 
     def put(self, t, x):
-        self.component.do("SetTime", c.c_double(t))
         if not self.by_name:
-            self.component.do("SetContinuousStates", doubles(x), c.c_size_t(self.n))
+            self.component.be_at(t, x)
             return
+        self.component.do("SetTime", c.c_double(t))
         for name, value in zip(self.binary.state_elements, x, strict=True):
             self.component.set(name, value)
 
