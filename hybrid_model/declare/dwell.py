@@ -11,6 +11,7 @@ from hybrid_model.declare.margins import greatest, least
 from hybrid_model.declare.real_numbers import is_real
 from hybrid_model.declare.transitions import Assignments, Trigger
 from hybrid_model.declare.variables import Kind, Value, Values, Variable
+from hybrid_model.declare.wrapper import Wrapper
 from hybrid_model.errors import DeclarationError
 
 SINCE, HELD, DWELL = "since_jump", "held_jumps", "minimum_dwell"
@@ -18,7 +19,7 @@ EXPIRED = 1e-9
 """Part of the dwell time: a jump so soon after it is over was waiting for it."""
 
 
-class MinimumDwell(Automaton):
+class MinimumDwell(Wrapper):
     """An automaton whose jumps on state keep a minimum time apart (temporal regularisation).
 
     A timer runs since the last jump on state; before it has reached the dwell time, no jump on state is taken and flow
@@ -48,7 +49,7 @@ class MinimumDwell(Automaton):
         taken = {SINCE, HELD, DWELL} & {variable.name for variable in automaton.variables}
         if taken:
             raise DeclarationError(f"{automaton.name} has a variable {min(taken)!r} already: rename it.")
-        self.automaton = automaton
+        super().__init__(automaton)
         self.name = f"{automaton.name} (minimum dwell time {dwell:g} s)"
         self.variables = (
             *automaton.variables,
@@ -56,41 +57,27 @@ class MinimumDwell(Automaton):
             Variable(HELD, Kind.DISCRETE, np.array(0.0), "", "jumps that waited", integer=True, output=True),
             Variable(DWELL, Kind.PARAMETER, np.array(float(dwell)), "s", "minimum time between two jumps on state"),
         )
-        self.jumps, self.clocks, self.priority = automaton.jumps, automaton.clocks, automaton.priority
-
-    @property
-    def has_flow_set(self) -> bool:
-        """See `Automaton.has_flow_set`."""
-        return self.automaton.has_flow_set
 
     def start_values(self, s: Values) -> Assignments:
         """See `Automaton.start_values`; the first jump has nothing to wait for."""
-        return {**self.automaton.start_values(s), SINCE: 2.0 * s[DWELL]}
+        return {**super().start_values(s), SINCE: 2.0 * s[DWELL]}
 
     def derivatives(self, s: Values) -> Assignments:
         """See `Automaton.derivatives`: the automaton's, and the timer runs."""
-        return {**self.automaton.derivatives(s), SINCE: 1.0}
+        return {**super().derivatives(s), SINCE: 1.0}
 
     def flow_margin(self, s: Values) -> Value:
         """See `Automaton.flow_margin`: the flow set, and everything before the dwell time is over."""
-        return greatest(self.automaton.flow_margin(s), s[DWELL] - s[SINCE])
+        return greatest(super().flow_margin(s), s[DWELL] - s[SINCE])
 
     def jump_margins(self, s: Values) -> list[Value]:
         """See `Automaton.jump_margins`: the jump sets after the dwell time is over."""
-        return [least(margin, s[SINCE] - s[DWELL]) for margin in self.automaton.jump_margins(s)]
-
-    def event_times(self, s: Values) -> list[Value]:
-        """See `Automaton.event_times`."""
-        return self.automaton.event_times(s)
+        return [least(margin, s[SINCE] - s[DWELL]) for margin in super().jump_margins(s)]
 
     def reset(self, jump: int, s: Values) -> Assignments:
         """See `Automaton.reset`: a jump on state starts the timer anew, and is counted if it waited."""
-        new = self.automaton.reset(jump, s)
+        new = super().reset(jump, s)
         if self.jumps[jump].trigger is Trigger.TIME:
             return new
         waited = np.where(s[SINCE] - s[DWELL] <= EXPIRED * s[DWELL], 1.0, 0.0)
         return {**new, SINCE: 0.0, HELD: s[HELD] + waited}
-
-    def output_values(self, s: Values) -> Assignments:
-        """See `Automaton.output_values`."""
-        return self.automaton.output_values(s)

@@ -14,9 +14,9 @@ import casadi as ca
 import numpy as np
 
 from hybrid_model.declare.automaton import Automaton, require_automaton
-from hybrid_model.declare.transitions import Assignments
-from hybrid_model.declare.variables import FloatArray, Kind, Value, Values
+from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.declare.vector_form import VectorForm, vector_form
+from hybrid_model.declare.wrapper import Wrapper
 from hybrid_model.native.trace import Trace, trace
 
 
@@ -42,47 +42,12 @@ def compiled(automaton: Automaton) -> Automaton:
     return _Compiled(automaton)
 
 
-class _Compiled(Automaton):
-    """An automaton that hands its maps on to another, except for the vector form."""
+class _Compiled(Wrapper):
+    """An automaton that has a faster vector form."""
 
     def __init__(self, automaton: Automaton) -> None:
-        self._automaton = automaton
+        super().__init__(automaton)
         self.traced = trace(automaton)
-        self.name, self.variables = automaton.name, automaton.variables
-        self.jumps, self.clocks, self.priority = automaton.jumps, automaton.clocks, automaton.priority
-
-    @property
-    def has_flow_set(self) -> bool:
-        """See `Automaton.has_flow_set`."""
-        return self._automaton.has_flow_set
-
-    def start_values(self, s: Values) -> Assignments:
-        """See `Automaton.start_values`."""
-        return self._automaton.start_values(s)
-
-    def derivatives(self, s: Values) -> Assignments:
-        """See `Automaton.derivatives`."""
-        return self._automaton.derivatives(s)
-
-    def flow_margin(self, s: Values) -> Value:
-        """See `Automaton.flow_margin`."""
-        return self._automaton.flow_margin(s)
-
-    def jump_margins(self, s: Values) -> list[Value]:
-        """See `Automaton.jump_margins`."""
-        return self._automaton.jump_margins(s)
-
-    def event_times(self, s: Values) -> list[Value]:
-        """See `Automaton.event_times`."""
-        return self._automaton.event_times(s)
-
-    def reset(self, jump: int, s: Values) -> Assignments:
-        """See `Automaton.reset`."""
-        return self._automaton.reset(jump, s)
-
-    def output_values(self, s: Values) -> Assignments:
-        """See `Automaton.output_values`."""
-        return self._automaton.output_values(s)
 
 
 class _TracedForm(VectorForm):

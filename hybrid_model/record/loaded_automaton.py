@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from hybrid_model.declare.automaton import Automaton
-from hybrid_model.declare.transitions import Assignments, ClockInfo, JumpInfo, Priority
-from hybrid_model.declare.variables import Value, Values, Variable
+from hybrid_model.declare.transitions import ClockInfo, JumpInfo, Priority
+from hybrid_model.declare.variables import Variable
 from hybrid_model.errors import DeclarationError
+
+
+def _refusing(what: str) -> Any:
+    """Return a method that says that it is not in the file."""
+
+    def refuse(self: LoadedAutomaton, *given: object) -> NoReturn:
+        raise DeclarationError(
+            f"{self.name} comes from a file, which holds a run and not the {what}: use the automaton that ran."
+        )
+
+    return refuse
 
 
 class LoadedAutomaton(Automaton):
@@ -43,35 +54,10 @@ class LoadedAutomaton(Automaton):
         """See `Automaton.has_flow_set`."""
         return self._has_flow_set
 
-    def start_values(self, s: Values) -> Assignments:
-        """Refuse, see `Automaton.start_values`."""
-        self._refuse("start map")
-
-    def derivatives(self, s: Values) -> Assignments:
-        """Refuse, see `Automaton.derivatives`."""
-        self._refuse("flow map")
-
-    def flow_margin(self, s: Values) -> Value:
-        """Refuse, see `Automaton.flow_margin`."""
-        self._refuse("flow set")
-
-    def jump_margins(self, s: Values) -> list[Value]:
-        """Refuse, see `Automaton.jump_margins`."""
-        self._refuse("jump sets")
-
-    def event_times(self, s: Values) -> list[Value]:
-        """Refuse, see `Automaton.event_times`."""
-        self._refuse("time events")
-
-    def reset(self, jump: int, s: Values) -> Assignments:
-        """Refuse, see `Automaton.reset`."""
-        self._refuse("jump maps")
-
-    def output_values(self, s: Values) -> Assignments:
-        """Refuse, see `Automaton.output_values`."""
-        self._refuse("output map")
-
-    def _refuse(self, what: str) -> NoReturn:
-        raise DeclarationError(
-            f"{self.name} comes from a file, which holds a run and not the {what}: use the automaton that ran."
-        )
+    start_values = _refusing("start map")
+    derivatives = _refusing("flow map")
+    flow_margin = _refusing("flow set")
+    jump_margins = _refusing("jump sets")
+    event_times = _refusing("time events")
+    reset = _refusing("jump maps")
+    output_values = _refusing("output map")

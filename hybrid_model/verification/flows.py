@@ -42,8 +42,6 @@ class FlowCheck:
         Automaton and samples.
     slack : Slack
         How far samples may be from an exact run.
-    rtol : float
-        Relative tolerance of states.
     findings : Findings
         Where violations go.
     method : str
@@ -55,12 +53,11 @@ class FlowCheck:
         If the method is none of these.
     """
 
-    def __init__(self, subject: Subject, slack: Slack, rtol: float, findings: Findings, method: str) -> None:
+    def __init__(self, subject: Subject, slack: Slack, findings: Findings, method: str) -> None:
         if method not in METHODS:
             raise SimulationError(f"verify was given method = {method!r}: the methods are {', '.join(METHODS)}.")
         self._subject = subject
-        self._slack, self._rtol = slack, rtol
-        self._findings = findings
+        self._slack, self._findings = slack, findings
         self._method = method
         automaton = subject.automaton
         self._guards = subject.guards if automaton.priority is Priority.JUMP else []
@@ -162,7 +159,7 @@ class FlowCheck:
 
     def _arrives(self, k: int, path: Path, *, report: bool = False) -> bool:
         found, expected = self._subject.x[k], path(float(self._subject.samples.t[k]))
-        allowed = self._slack.states + self._rtol * np.maximum(np.abs(found), np.abs(expected))
+        allowed = self._slack.between(found, expected)
         wrong = np.flatnonzero(~(np.abs(found - expected) <= allowed))
         if wrong.size and report:
             i = wrong[np.argmax(np.abs(found - expected)[wrong] / allowed[wrong])]
@@ -238,7 +235,7 @@ class FlowCheck:
         if b - a <= EXPLICIT_STEP * self._slack.length or b - a <= 64.0 * math.ulp(a):
             slope = rates(a, x)
             return lambda t: x + (t - a) * slope
-        options = {"rtol": max(INTEGRATION * self._rtol, 3e-14), "atol": INTEGRATION * self._slack.states}
+        options = {"rtol": max(INTEGRATION * self._slack.rtol, 3e-14), "atol": INTEGRATION * self._slack.states}
         solution = solve_ivp(rates, (a, b), x, method=self._method, dense_output=True, **options)
         if solution.status != 0:
             raise FlowMapError(f"{self._method} cannot follow the flow map from t = {a:.9g} s: {solution.message}")

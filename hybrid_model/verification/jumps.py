@@ -21,16 +21,13 @@ class JumpCheck:
         Automaton and samples.
     slack : Slack
         How far samples may be from an exact run.
-    rtol : float
-        Relative tolerance of states.
     findings : Findings
         Where violations go.
     """
 
-    def __init__(self, subject: Subject, slack: Slack, rtol: float, findings: Findings) -> None:
+    def __init__(self, subject: Subject, slack: Slack, findings: Findings) -> None:
         self._subject = subject
-        self._slack, self._rtol = slack, rtol
-        self._findings = findings
+        self._slack, self._findings = slack, findings
 
     def check(self, k: int) -> None:
         """Check the jump from sample `k` to the next."""
@@ -76,8 +73,7 @@ class JumpCheck:
         subject = self._subject
         expected = subject.reset(index, k)
         found = np.concatenate([subject.x[k + 1], subject.z[k + 1]])
-        allowed = self._slack.all_states + self._rtol * np.maximum(np.abs(found), np.abs(expected))
-        return expected, found, allowed
+        return expected, found, self._slack.between(found, expected)
 
     def _lands(self, index: int, k: int) -> bool:
         expected, found, allowed = self._difference(index, k)

@@ -32,6 +32,8 @@ class Slack:
         In s.
     states, all_states : ndarray
         Absolute tolerance of each continuous state, and of the discrete ones after them.
+    rtol : float
+        Relative tolerance of states.
     length : float
         Of the data in s.
     """
@@ -41,7 +43,7 @@ class Slack:
         self.length = float(np.ptp(known)) if known.size else 0.0
         latest = float(np.abs(known).max()) if known.size else 0.0
         self.time = tolerances.time or max(TIME * self.length, 8.0 * math.ulp(latest))
-        self._declared = tolerances.atol
+        self._declared, self.rtol = tolerances.atol, tolerances.rtol
         self.all_states = self._of_states(subject)
         self.states = self.all_states[: subject.x.shape[1]]
 
@@ -57,6 +59,10 @@ class Slack:
         nominal = np.array([v.nominal or 0.0 for v in subject.automaton.of_kind(kind) for _ in range(v.size)])
         largest = float(sizes.max(initial=np.finfo(np.float64).tiny))
         return STATE * np.where(nominal > 0.0, nominal, np.where(sizes < NOTHING * largest, largest, sizes))
+
+    def between(self, a: FloatArray, b: FloatArray) -> FloatArray:
+        """Return how far two values of the continuous states, or of all states, may be apart."""
+        return self.all_states[: len(a)] + self.rtol * np.maximum(np.abs(a), np.abs(b))
 
     def of_margins(self, margins: Callable[[FloatArray], FloatArray], x: FloatArray) -> FloatArray:
         """Return how far margins may be on the wrong side of zero: as much as they change with the states' tolerances.

@@ -86,17 +86,16 @@ def verify(
             f"the data hold no sample, so nothing can be said about {automaton.name}: give at least one row."
         )
     subject = Subject(automaton, data, inputs)
-    tolerances = tolerances or Tolerances()
-    slack = Slack(subject, tolerances)
+    slack = Slack(subject, tolerances or Tolerances())
     findings = Findings(subject.samples)
     usable = _finite(subject, findings)
     _hybrid_time(subject.samples, findings)
     flows = list(_flows(subject.samples, usable))
-    flow_check = FlowCheck(subject, slack, tolerances.rtol, findings, method)
+    flow_check = FlowCheck(subject, slack, findings, method)
     for first, last in flows:
         flow_check.check(first, last)
     jumps = np.flatnonzero((np.diff(subject.samples.j) == 1) & usable[:-1] & usable[1:])
-    jump_check = JumpCheck(subject, slack, tolerances.rtol, findings)
+    jump_check = JumpCheck(subject, slack, findings)
     for k in jumps:
         jump_check.check(int(k))
     lengths = [subject.samples.t[last] - subject.samples.t[first] for first, last in flows]

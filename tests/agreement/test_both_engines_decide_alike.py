@@ -1,5 +1,7 @@
 """Rules that the engine in Python and the engine in C decide each by itself: the same model ends alike in both."""
 
+import re
+
 import numpy as np
 import pytest
 from small_automata import Ramp
@@ -222,3 +224,12 @@ def test_only_a_record_bounds_the_number_of_jumps_of_a_run(exported):
     result = run_event_exact(System([After("a", late)], {}), 5.5e-3)
     assert result.ended is Ended.HORIZON
     assert result.final == run_fmu(exported, late, 5.5e-3).final == {"a.k": 5}
+
+
+def test_models_carry_every_number_that_the_engine_in_c_reads():
+    """A name that one side lacks would be a zero in C."""
+    fields = re.search(r"typedef struct \{([^}]*)\} ModelScales;", own_file("model.h"))[1]
+    names = re.findall(r"(\w+)(?:\[\w+\])?[,;]", fields)
+    assert sorted(names) == sorted(scales.of_models())
+    assert int(re.search(r"#define N_REACH_AT (\d+)", own_file("model.h"))[1]) == len(scales.REACH_AT)
+    assert int(re.search(r"#define N_GAPS (\d+)", own_file("parts.h"))[1]) == GAPS

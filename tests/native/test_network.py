@@ -11,7 +11,8 @@ from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.errors import TraceError
 from hybrid_model.models import BouncingBall
-from hybrid_model.native.networks.network import NetworkTrace, NotLoopable, network_trace, trace_any, worth_looping
+from hybrid_model.native.networks.members import NotLoopable
+from hybrid_model.native.networks.network import NetworkTrace, network_trace, trace_any, worth_looping
 from hybrid_model.native.trace import Trace
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 import hybrid_model as hm
 from hybrid_model.reference import zero_crossings
-from hybrid_model.reference.zero_crossings import DEGREE, first_nonnegative, may_rise, scan_times, ulp
+from hybrid_model.reference.zero_crossings import DEGREE, first_nonnegative, may_rise, scan_times
+from hybrid_model.scales import ulp
 
 
 def first_rise(margin, a, b, panels=1):

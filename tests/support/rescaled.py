@@ -3,46 +3,26 @@
 import numpy as np
 
 import hybrid_model as hm
-from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.variables import Kind, Values
+from hybrid_model.declare.wrapper import Wrapper
 
 
-class InOtherTime(Automaton):
+class InOtherTime(Wrapper):
     """The same automaton where one unit of its time is `unit` seconds: a run is the same one, stretched."""
 
     def __init__(self, automaton, unit):
-        self.automaton, self.unit = automaton, unit
-        self.name, self.variables, self.jumps = automaton.name, automaton.variables, automaton.jumps
-        self.clocks, self.priority = automaton.clocks, automaton.priority
+        super().__init__(automaton)
+        self.unit = unit
 
-    def own(self, s):
+    def inner(self, s):
         names = [v.name for v in self.variables if v.kind is not Kind.OUTPUT]
         return Values(self.name, {"t": s.t / self.unit, **{name: s[name] for name in names}})
 
-    @property
-    def has_flow_set(self):
-        return self.automaton.has_flow_set
-
-    def start_values(self, s):
-        return self.automaton.start_values(self.own(s))
-
     def derivatives(self, s):
-        return {name: rate / self.unit for name, rate in self.automaton.derivatives(self.own(s)).items()}
-
-    def flow_margin(self, s):
-        return self.automaton.flow_margin(self.own(s))
-
-    def jump_margins(self, s):
-        return self.automaton.jump_margins(self.own(s))
+        return {name: rate / self.unit for name, rate in super().derivatives(s).items()}
 
     def event_times(self, s):
-        return [time * self.unit for time in self.automaton.event_times(self.own(s))]
-
-    def reset(self, jump, s):
-        return self.automaton.reset(jump, self.own(s))
-
-    def output_values(self, s):
-        return self.automaton.output_values(self.own(s))
+        return [time * self.unit for time in super().event_times(s)]
 
 
 class Sawtooth(hm.HybridAutomaton):
