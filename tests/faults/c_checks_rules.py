@@ -330,7 +330,13 @@ def check_values(start):
             instance = Instance(harness, kind=kind)
             go_to_mode(instance, mode, fmi)
             before = mode in ("instantiated", "initialization")
-            allowed = {"period": before, "x[1]": before, "count[1]": before, "total": False, "time": False}
+            allowed = {
+                "period": before,
+                "x[1]": before or mode == "continuous",
+                "count[1]": before,
+                "total": False,
+                "time": False,
+            }
             allowed |= {"push": mode not in ("configuration", "terminated"), "der(x[1])": False}
             for name, may in allowed.items():
                 held = instance.get(name)
