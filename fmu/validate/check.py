@@ -12,7 +12,8 @@ from fmu.archives.checks import DESCRIPTION, LIMITS, ArchiveLimits
 from fmu.archives.reading import Archive, ArchiveError
 from fmu.importer.unpacking import unpack
 from fmu.validate.findings import Finding, Report, error, note, quoted, warning
-from fmu.validate.reading.description import Description, read_description
+from fmu.validate.reading.description import Description
+from fmu.validate.reading.read_description import read_description
 from fmu.validate.reading.xml_file import XmlError, as_utf8, parse, require_size, schema_findings
 from fmu.validate.rules.binaries import binary_findings
 from fmu.validate.rules.files import file_findings

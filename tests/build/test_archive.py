@@ -22,7 +22,8 @@ from fmu.build.source_files import source_names
 from fmu.describe.description import Description
 from fmu.describe.experiment import round_step
 from fmu.describe.reference_results import FOLDER
-from fmu.describe.variables import Fmi, fmu_variables
+from fmu.describe.variable_table import fmu_variables
+from fmu.describe.variables import Fmi
 from hybrid_model.models import BouncingBall
 from hybrid_model.native.trace import trace
 

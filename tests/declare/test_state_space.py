@@ -5,7 +5,8 @@ import pytest
 from scipy.linalg import expm
 
 import hybrid_model as hm
-from fmu.describe.variables import Fmi, fmu_variables
+from fmu.describe.variable_table import fmu_variables
+from fmu.describe.variables import Fmi
 from hybrid_model.declare.state_space import state_space
 from hybrid_model.native.trace import trace
 

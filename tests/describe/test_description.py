@@ -9,13 +9,13 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import hybrid_model as hm
-from fmu.describe.variables import fmu_variables
+from fmu.describe.variable_table import fmu_variables
 from fmu.errors import ExportError
 from fmu.export import export_fmu
 from hybrid_model.native.trace import trace
 
-QUICK = ("bouncing_ball", "agent2_dynamic", "thermostat", "newtons_cradle")
-"""fmpy takes its time with names of many parts."""
+QUICK = ("bouncing_ball", "agent2_dynamic")
+"""fmpy takes its time with names of many parts; `test_description_catalogue` asks it about further descriptions."""
 MODELS = [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in cases()]
 
 

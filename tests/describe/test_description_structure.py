@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 import hybrid_model as hm
 from fmu.describe.model_structure import model_structure
-from fmu.describe.variables import Bank, Fmi, fmu_variables
+from fmu.describe.variable_table import fmu_variables
+from fmu.describe.variables import Bank, Fmi
 from hybrid_model.models import BouncingBall
 from hybrid_model.native.factors import Factor, factors
 from hybrid_model.native.networks.network import network_trace

@@ -196,7 +196,7 @@ def test_a_bad_step_has_two_seconds():
 
 def test_a_flood_of_output_is_limited(tmp_path):
     """The limit of file size holds on stdout: the disk is not filled while the time runs out."""
-    report = check(tmp_path, 3, "FLOOD", description=PLAIN, limits=RunLimits(seconds=2.0, file_bytes=1 << 20))
+    report = check(tmp_path, 3, "FLOOD", description=PLAIN, limits=RunLimits(seconds=1.0, file_bytes=1 << 20))
     assert errors(report) == {"run.hang"}
     assert any("talkative" in finding.message for finding in report.findings)
 

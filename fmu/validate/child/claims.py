@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fmu.validate.child.calls import DISCARD, OK, WARNING, Recorder, Variable
-from fmu.validate.child.runs import instantiate, run_of
+from fmu.validate.child.interface_types import instantiate, run_of
 
 FLAGS = "FMI 2.0.4 sections 3.3.1 and 4.3.1; FMI 3.0.2 sections 2.4.6 and 4.3"
 _LARGEST = 1_000_000

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from fmu.validate.child.calls import Recorder
-from fmu.validate.child.runs import instantiate, run_of
+from fmu.validate.child.interface_types import instantiate, run_of
 
 STRUCTURE = "FMI 2.0.4 section 2.2.8; FMI 3.0.2 section 2.4.8: attribute dependencies"
 _PAIRS = 60

@@ -15,9 +15,9 @@ from fmu.validate.child.comparison import Whole, compare
 from fmu.validate.child.dependencies import dependencies
 from fmu.validate.child.fmi2 import Fmi2
 from fmu.validate.child.fmi3 import Fmi3
+from fmu.validate.child.interface_types import instantiate, run_of
 from fmu.validate.child.perturbation import moved_starts, moved_states
 from fmu.validate.child.run import Run
-from fmu.validate.child.runs import instantiate, run_of
 from fmu.validate.child.slopes import slopes
 from fmu.validate.child.start_values import start_values
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from fmu.validate.child.calls import Recorder, Variable
 from fmu.validate.child.dependencies import STRUCTURE
-from fmu.validate.child.runs import instantiate, run_of
+from fmu.validate.child.interface_types import instantiate, run_of
 
 ORDER = "FMI 2.0.4 sections 2.2.7 and 2.2.8; FMI 3.0.2 sections 2.4.7 and 2.4.8: attribute derivative"
 _SMALL, _LARGE = 1e-6, 1e-4

@@ -7,8 +7,8 @@ import math
 from typing import Any
 
 from fmu.validate.child.calls import Recorder, Variable
+from fmu.validate.child.interface_types import instantiate, run_of
 from fmu.validate.child.perturbation import ORDER
-from fmu.validate.child.runs import instantiate, run_of
 
 _POINTS = 20
 _MISFIT, _FIT = 0.5, 0.01

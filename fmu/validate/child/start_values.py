@@ -7,7 +7,7 @@ from typing import Any
 
 from fmu.standard.value_types import start_value
 from fmu.validate.child.calls import Recorder, Refused, Variable
-from fmu.validate.child.runs import instantiate
+from fmu.validate.child.interface_types import instantiate
 
 STARTS = "FMI 2.0.4 section 2.2.7; FMI 3.0.2 section 2.4.7: attributes initial and start"
 _DIGITS = {"Float32": 1e-6}
