@@ -1,8 +1,9 @@
 """Hybrid automata: declare them once, run them event-exactly, export and co-simulate them."""
 
-from hybrid_model.declare.automaton import Automaton, HybridAutomaton
+from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.dwell import MinimumDwell
+from hybrid_model.declare.hybrid_automaton import HybridAutomaton
 from hybrid_model.declare.margins import greatest, least
 from hybrid_model.declare.modes import ModalAutomaton, Mode, Switch, TimedSwitch
 from hybrid_model.declare.signals import Signal

@@ -14,8 +14,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hybrid_model.declare.automaton import HybridAutomaton
 from hybrid_model.declare.class_body import require_sound_body
+from hybrid_model.declare.hybrid_automaton import HybridAutomaton
+from hybrid_model.declare.map_results import checked_assignments, checked_margin
 from hybrid_model.declare.margins import least
 from hybrid_model.declare.signatures import ExplainedCall
 from hybrid_model.declare.transitions import Assignments, Jump, TimeEvent, require_maps
@@ -153,12 +154,14 @@ class ModalAutomaton(HybridAutomaton):
         states = [v.name for v in self.variables if v.kind.name == "STATE"]
         if mode.flow_map is None:
             return {name: 0.0 * s[name] for name in states}
-        return self._checked(f"the flow map of mode {mode.name!r}", mode.flow_map(self, s), states, states)
+        return checked_assignments(
+            self.name, f"the flow map of mode {mode.name!r}", mode.flow_map(self, s), states, states
+        )
 
     def _invariant_of(self, mode: Mode, s: Values) -> Value:
         if mode.invariant is None:
             return 1.0
-        return self._margin(f"the invariant of mode {mode.name!r}", mode.invariant(self, s))
+        return checked_margin(self.name, f"the invariant of mode {mode.name!r}", mode.invariant(self, s))
 
     def _present(self, s: Values) -> Mode:
         index = int(s.mode)
@@ -196,7 +199,7 @@ class ModalAutomaton(HybridAutomaton):
         def jump_set(self: ModalAutomaton, s: Values) -> Value:
             if _is_number(s.mode) and s.mode != source:
                 return -0.5
-            guard = self._margin(f"the guard of {switch.name!r}", switch.guard(self, s))
+            guard = checked_margin(self.name, f"the guard of {switch.name!r}", switch.guard(self, s))
             return least(guard, 0.5 - np.abs(s.mode - source))
 
         return Jump(switch.name, jump_set, jump_map)

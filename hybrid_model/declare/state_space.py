@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from hybrid_model.declare.automaton import HybridAutomaton
 from hybrid_model.declare.class_body import RESERVED
+from hybrid_model.declare.hybrid_automaton import HybridAutomaton
 from hybrid_model.declare.transitions import Assignments, Clock, TimeEvent
 from hybrid_model.declare.variables import (
     Dimension,

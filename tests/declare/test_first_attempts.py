@@ -29,7 +29,7 @@ def run(automaton, t_end=1.0, **options):
 
 
 @pytest.mark.parametrize(
-    "name", ["reset", "derivatives", "start_values", "jump_margins", "event_times", "variables", "name", "_margin"]
+    "name", ["reset", "derivatives", "start_values", "jump_margins", "event_times", "variables", "name", "_named_once"]
 )
 def test_a_method_of_a_name_of_the_framework(name):
     wrong = ball_with(**{name: lambda self, s: {}})

@@ -20,11 +20,13 @@ import numpy as np
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition
+from hybrid_model.declare.hybrid_automaton import HybridAutomaton
 from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.modes import ModalAutomaton
 from hybrid_model.declare.variables import Variable
 from hybrid_model.native.trace import Trace
 
-_MESSAGES = frozenset(cls.__module__ for cls in (Automaton, Composition, Layout, Trace))
+_MESSAGES = frozenset(cls.__module__ for cls in (HybridAutomaton, ModalAutomaton, Composition, Layout, Trace))
 """Modules that read an automaton's name for messages only."""
 _SHAPE = ("shape", "size")
 """Properties of variables that read the start value for its shape only."""
