@@ -4,33 +4,18 @@ import json
 
 import matplotlib.pyplot as plt
 import pytest
+from small_scenario import small_scenario
 
 from cosim.cli.main import main
-
-BASE = """
-name = "small"
-stop_time = 3.0
-[network]
-agents = 3
-edges = [[1, 2], [2, 3]]
-initial = [1.0, 0.0, -0.4]
-[weights]
-kind = "constant"
-value = {value}
-[trigger]
-kind = "{kind}"
-{threshold}
-{more}
-"""
 
 
 @pytest.fixture
 def scenario(tmp_path):
     """Write a scenario with some entries changed."""
 
-    def write(value="1.0", kind="static", threshold="threshold = 0.2", more=""):
+    def write(**changes):
         path = tmp_path / "small.toml"
-        path.write_text(BASE.format(value=value, kind=kind, threshold=threshold, more=more))
+        path.write_text(small_scenario(stop_time=3.0, **changes))
         return str(path)
 
     return write

@@ -6,25 +6,13 @@ import json
 import sys
 
 import pytest
+from small_scenario import small_scenario
 
 from cosim.cli.main import main
 from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall
 
-SMALL = """
-name = "small"
-stop_time = 5.0
-[network]
-agents = 3
-edges = [[1, 2], [2, 3]]
-initial = [1.0, 0.0, -0.4]
-[weights]
-kind = "constant"
-value = 1.0
-[trigger]
-kind = "static"
-threshold = 0.2
-"""
+SMALL = small_scenario()
 
 
 @pytest.fixture

@@ -17,19 +17,7 @@ _LEFT_OUT, _SEEDED = 40, 1000
 
 
 def claims(description: Description, kind: str) -> dict[str, dict[str, Any]]:
-    """Return what each experiment on a claim changes in the plan, by its name in messages.
-
-    Parameters
-    ----------
-    description : Description
-    kind : str
-        Interface type.
-
-    Returns
-    -------
-    dict
-        Only experiments that have something to ask for.
-    """
+    """Return what each experiment on a claim, if there is something to ask for, changes in the plan, by its name."""
     experiments: dict[str, dict[str, Any]] = {}
     values, parameters = _exact(description)
     if values or parameters:

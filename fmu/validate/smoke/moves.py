@@ -14,19 +14,7 @@ _UNKNOWNS, _KNOWNS, _ELEMENTS = 100, 100, 100
 
 
 def moves(description: Description, kind: str) -> dict[str, dict[str, Any]]:
-    """Return what each experiment on moved values changes in the plan, by its name in messages.
-
-    Parameters
-    ----------
-    description : Description
-    kind : str
-        Interface type.
-
-    Returns
-    -------
-    dict
-        Only experiments that have something to move.
-    """
+    """Return what each experiment on moved values, if there are any, changes in the plan, by its name."""
     experiments: dict[str, dict[str, Any]] = {}
     derivatives = [v for u in description.structure["derivatives"] if (v := description.referred(u.reference))]
     states = [s for d in derivatives if d.derivative is not None and (s := description.referred(d.derivative))]

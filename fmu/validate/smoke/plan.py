@@ -19,22 +19,7 @@ _JACOBIAN = 20
 
 
 def plan_of(folder: Path, binary: Path, description: Description, kind: str) -> dict[str, Any]:
-    """Return what the experiments on an interface type need to know.
-
-    Parameters
-    ----------
-    folder : Path
-        The FMU, extracted.
-    binary : Path
-    description : Description
-    kind : str
-        Interface type.
-
-    Returns
-    -------
-    dict
-        As JSON takes it.
-    """
+    """Return what the experiments on an interface type of an extracted FMU need to know, as JSON takes it."""
     can = partial(description.can, kind)
     directional, adjoint = can(Capability.DIRECTIONAL_DERIVATIVES), can(Capability.ADJOINT_DERIVATIVES)
     start, stop, step, points = _times(description, description.interfaces[kind])
