@@ -12,7 +12,7 @@ import pkgutil
 import numpy as np
 import pytest
 from catalogue import cases
-from executions import reference, shown, starts
+from executions import reference, shown, starts, values_of
 from own_importer import exchange, step_through
 
 import hybrid_model as hm
@@ -84,10 +84,7 @@ def compare(case, arc, result):
     np.testing.assert_allclose([t for t, _ in ticks], [t for t, _ in expected], rtol=0, atol=TIME_TOLERANCE)
     assert len(result.times) == SAMPLES
     for name in [port.removeprefix("block.") for port in result.signals if port.startswith("block.")]:
-        base, _, index = name.partition("[")
-        values = arc.at(base, np.minimum(result.times, arc.t[-1]))
-        if index:
-            values = values[(slice(None), *(int(i) - 1 for i in index.rstrip("]").split(",")))]
+        values = values_of(arc, name, result.times)
         np.testing.assert_allclose(result.signals[f"block.{name}"], values, rtol=0, atol=STATE_TOLERANCE, err_msg=name)
 
 
@@ -121,10 +118,7 @@ def compare_run(case, arc, run, *, without=()):
     assert list(run.values) == shown(case.automaton)
     kept = [k for k, t in enumerate(run.times) if t not in without]
     for name, found in run.values.items():
-        base, _, index = name.partition("[")
-        values = arc.at(base, np.minimum([run.times[k] for k in kept], arc.t[-1]))
-        if index:
-            values = values[(slice(None), *(int(i) - 1 for i in index.rstrip("]").split(",")))]
+        values = values_of(arc, name, [run.times[k] for k in kept])
         np.testing.assert_allclose(np.array(found)[kept], values, rtol=0, atol=STATE_TOLERANCE, err_msg=name)
 
 

@@ -8,7 +8,8 @@ import itertools
 
 import numpy as np
 import pytest
-from catalogue import cases
+from catalogue import Case, cases
+from executions import python_run, reference, values_of
 from fmi_driver.binary import OK, Binary
 from fmi_driver.component import Component, Step
 from fmi_driver.runs import advance
@@ -74,52 +75,17 @@ def compare(automaton, arc, record, outputs, way, changes=()):
     kept = [k for k, t in enumerate(times) if t not in changed and not (np.abs(jumps - t) < 1e-9).any()]
     assert len(kept) >= min(len(times), 2) - 1
     for column, name in enumerate(outputs):
-        base, _, index = name.partition("[")
-        values = arc.at(base, [times[k] for k in kept])
-        if index:
-            values = values[(slice(None), *(int(i) - 1 for i in index.rstrip("]").split(",")))]
+        values = values_of(arc, name, [times[k] for k in kept])
         got = [record.samples[k][1][column] for k in kept]
         np.testing.assert_allclose(got, values, rtol=0, atol=STATE_TOLERANCE, err_msg=f"{name}, {way}")
-
-
-def signals(automaton, steps):
-    """Step inputs of a case as signals for `simulate`."""
-    inputs = {}
-    for variable in automaton.of_kind(Kind.INPUT):
-        names = element_names(variable)
-
-        def value(t, names=names, variable=variable):
-            starts = variable.start.ravel()
-            rows = [
-                [start, *(v for at, v in steps.get(name, ()) if at <= t)][-1]
-                for name, start in zip(names, starts, strict=True)
-            ]
-            return np.reshape(rows, variable.shape)
-
-        if any(name in steps for name in names):
-            inputs[variable.name] = hm.Signal(value, sorted({t for name in names for t, _ in steps.get(name, ())}))
-    return inputs
 
 
 # Every model of the repository.
 
 
-@pytest.fixture(scope="module")
-def references():
-    runs = {}
-
-    def reference(name):
-        if name not in runs:
-            case = cases()[name]
-            runs[name] = hm.simulate(case.automaton, case.t_end, inputs=signals(case.automaton, case.steps))
-        return runs[name]
-
-    return reference
-
-
 @pytest.mark.parametrize("name", list(cases()))
-def test_every_model_in_every_way(name, exported, references):
-    case, arc = cases()[name], references(name)
+def test_every_model_in_every_way(name, exported):
+    case, arc = cases()[name], reference(name)
     loaded = Binary(exported(case.automaton, name))
     changes = [(t, port, value) for port, rows in case.steps.items() for t, value in rows]
     for way in WAYS:
@@ -154,7 +120,7 @@ def test_random_automata_in_every_way(data, binary):
     automaton = Mix(**values)
     step = 0.2 + 0.6 * data.draw(UNIT), draw(0.0, 0.3)
     t_end = 1.3
-    arc = hm.simulate(automaton, t_end, inputs=signals(automaton, {"push": [step]}))
+    arc = python_run(Case(automaton, t_end, {"push": [step]}))
     # Events that are almost simultaneous may rightly be taken in either order: this is not about them.
     visible = [jump.t for jump in arc.jumps if jump.name != "switch"]
     assume(all(b - a > 1e-6 for a, b in itertools.pairwise([*visible, t_end])))
@@ -215,7 +181,7 @@ def test_an_input_set_between_steps_counts_from_then_on(make):
     instance.step(0.0, 0.1)
     instance.set("push", 1.0)
     step = instance.step(0.1, 0.9)
-    arc = hm.simulate(automaton, 1.0, inputs=signals(automaton, {"push": [change[::2]]}))
+    arc = python_run(Case(automaton, 1.0, {"push": [change[::2]]}))
     first = next(jump for jump in arc.jumps if jump.name == "second")
     assert step.early
     assert step.time == pytest.approx(first.t, abs=1e-9)

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 from c_harness import NONE, Instance
+from executions import values_of
 
 import hybrid_model as hm
 from fmu.describe.variables import Bank, FmiType
@@ -72,10 +73,8 @@ def agree(witness, arc, seen, *, times=True):
     kept = [t for t in seen.samples if t not in changed and not (np.abs(instants - t) < 1e-9).any()]
     assert 2 * len(kept) >= len(seen.samples)
     for name in seen.samples[0.0]:
-        base, _, index = name.partition("[")
         for t in kept:
-            value = arc.at(base, t)
-            value = value[tuple(int(i) - 1 for i in index.rstrip("]").split(","))] if index else value
+            value = values_of(arc, name, t)
             assert abs(seen.samples[t][name] - value) <= STATE_TOLERANCE, (name, t, seen.samples[t][name], value)
 
 

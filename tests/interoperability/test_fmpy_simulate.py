@@ -9,7 +9,7 @@ import fmpy
 import numpy as np
 import pytest
 from catalogue import cases
-from executions import reference, shown, step_values
+from executions import reference, shown, step_values, values_of
 
 import hybrid_model as hm
 from hybrid_model.declare.variables import Kind, element_names
@@ -73,12 +73,6 @@ def outputs_of(path, case):
     return [name for name in shown(case.automaton) if name in outputs]
 
 
-def at(arc, name, times):
-    base, _, index = name.partition("[")
-    values = arc.at(base, times)
-    return values[(slice(None), *(int(i) - 1 for i in index.rstrip("]").split(",")))] if index else values
-
-
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("name", MODELS)
 def test_fmpy_gives_the_python_run(name, way, exported):
@@ -95,7 +89,7 @@ def test_fmpy_gives_the_python_run(name, way, exported):
     times = np.array([row["time"] for row in kept])
     for output in outputs:
         found = np.array([row[output] for row in kept])
-        expected = at(arc, output, np.minimum(times, arc.t[-1]))
+        expected = values_of(arc, output, times)
         np.testing.assert_allclose(found, expected, rtol=0, atol=STATES, err_msg=output)
 
 

@@ -8,7 +8,7 @@ import fmpy
 import numpy as np
 import pytest
 from catalogue import cases
-from executions import reference, shown
+from executions import reference, shown, values_of
 from small_automata import Blinking, Listening
 
 import hybrid_model as hm
@@ -78,11 +78,8 @@ def test_models_in_a_container_are_the_python_run(name, fmi, exported, tmp_path)
     found = run(made, tmp_path / "container.fmu", case.t_end, step, shown(case.automaton))
     arc = reference(name)
     away = np.min(np.abs(found["time"][:, None] - [jump.t for jump in arc.jumps]), axis=1) > 1e-9
-    times = np.minimum(found["time"], arc.t[-1])
     for variable in shown(case.automaton):
-        base, _, index = variable.partition("[")
-        expected = arc.at(base, times)
-        expected = expected[:, int(index.rstrip("]")) - 1] if index else expected
+        expected = values_of(arc, variable, found["time"])
         np.testing.assert_allclose(found[variable][away], expected[away], rtol=0, atol=STATE_TOLERANCE)
 
 

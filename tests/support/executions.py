@@ -46,6 +46,13 @@ def starts(automaton):
     }
 
 
+def values_of(arc, name, times):
+    """The values of a scalar at times up to the end of a run, by the name that it has in an FMU."""
+    base, _, index = name.partition("[")
+    values = arc.at(base, np.minimum(times, arc.t[-1]))
+    return values[(..., *(int(i) - 1 for i in index.rstrip("]").split(",")))] if index else values
+
+
 def shown(automaton):
     """The scalars that an FMU shows of states, discrete states and outputs."""
     kinds = (Kind.STATE, Kind.DISCRETE, Kind.OUTPUT)
