@@ -9,6 +9,7 @@ import pytest
 from small_scenario import small_scenario
 
 from cosim.cli.main import main
+from cosim.cli.paper import FIXED_STEPS
 from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall
 
@@ -141,7 +142,10 @@ def test_a_stop_time_of_zero_is_refused(small, tmp_path, capsys):
     assert "the stop after the start" in capsys.readouterr().err
 
 
-def test_paper_reproduces_compares_and_draws(tmp_path, capsys):
+@pytest.mark.parametrize("steps", [FIXED_STEPS[:2], pytest.param(FIXED_STEPS, marks=pytest.mark.long)], ids=len)
+def test_paper_reproduces_compares_and_draws(steps, tmp_path, capsys, monkeypatch):
+    """Most of its time goes into the shortest of the fixed steps."""
+    monkeypatch.setattr("cosim.cli.paper.FIXED_STEPS", steps)
     assert main(["paper", "--out", str(tmp_path)]) == 0
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["scenario"] == "paper-a"
@@ -155,6 +159,7 @@ def test_paper_reproduces_compares_and_draws(tmp_path, capsys):
         assert cosim["events_total"] == sum(events)
         assert cosim["max_event_time_difference"] < 1e-7
         assert cosim["max_state_difference"] < 1e-8
+        assert [trial["step"] for trial in cosim["fixed_step"]] == list(steps)
         assert all(trial["max_final_state_difference"] > 1e-3 for trial in cosim["fixed_step"])
         assert summary["certificates"][kind]["valid"]["rate"] == pytest.approx(1.2112e-4, rel=1e-4)
         for figure in ("states", "edge_norm"):
