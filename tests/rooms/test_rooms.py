@@ -40,6 +40,20 @@ def test_each_room_says_what_it_is_for():
     assert silent == []
 
 
+def test_modules_offer_names_of_their_own_only():
+    """Only a package's `__init__` passes on the names of others."""
+    foreign = {}
+    for file in (file for room in rooms() for file in room.glob("*.py") if file.name != "__init__.py"):
+        body = ast.parse(file.read_text(encoding="utf-8")).body
+        assigned = {name.id: node for node in body for name in getattr(node, "targets", []) if hasattr(name, "id")}
+        if "__all__" in assigned:
+            own = {*assigned, *(node.name for node in body if hasattr(node, "name"))}
+            own |= {node.target.id for node in body if isinstance(node, ast.AnnAssign)}
+            foreign[file.relative_to(ROOT).as_posix()] = {*ast.literal_eval(assigned["__all__"].value)} - own
+    assert len(foreign) > 50
+    assert {file: names for file, names in foreign.items() if names} == {}
+
+
 def test_each_room_is_in_a_contract():
     named = {
         part.strip()

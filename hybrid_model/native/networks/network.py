@@ -27,7 +27,7 @@ from hybrid_model.native.trace import Trace, trace
 if TYPE_CHECKING:
     import scipy.sparse
 
-__all__ = ["NetworkTrace", "NotLoopable", "network_trace", "trace_any", "worth_looping"]
+__all__ = ["NetworkTrace", "network_trace", "trace_any", "worth_looping"]
 
 _MEAN_GROUP = 4
 
