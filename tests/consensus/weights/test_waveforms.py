@@ -1,6 +1,7 @@
 """Waveforms of every kind: definitions, quadrature, periods, closed forms done by hand."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,10 +18,11 @@ from hybrid_model.consensus.switching.sequence import SwitchingSequence
 from hybrid_model.consensus.weights.carriers import UnitCarrier
 from hybrid_model.consensus.weights.constant import ConstantWeight
 from hybrid_model.consensus.weights.distances import distance_weights, reliability_weight
+from hybrid_model.consensus.weights.edge_automata import ForeseenWeights
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.function import FunctionWeight
 from hybrid_model.consensus.weights.gated_sine import GatedSine, WeightMap
-from hybrid_model.consensus.weights.kinds import weights_block
+from hybrid_model.consensus.weights.kinds import WeightKind, weights_block
 from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
 from hybrid_model.consensus.weights.sampled import SampledWeight
 from hybrid_model.consensus.weights.sine import SineWeight
@@ -139,6 +141,44 @@ class TestEveryKind:
         np.testing.assert_allclose(wave.integral(begins, ends), scalars, atol=1e-10)
         assert wave.integral(begins[:, None], ends).shape == (7, 7)
         np.testing.assert_array_equal(wave.value(begins), [float(wave.value(t)) for t in begins])
+
+
+ONE_OF_EACH = {
+    WeightKind.GATED_SINE: GatedSine(4.0, 5.0, 60.0, 0.3),
+    WeightKind.CONSTANT: ConstantWeight(0.7),
+    WeightKind.SINE: SineWeight(1.0, 0.5, 3.0, 0.2),
+    WeightKind.SQUARE: SquareWeight(2.0, 0.3, 3.0, 40.0),
+    WeightKind.PIECEWISE: PiecewiseWeight((0.0, 1.0), (0.4, 2.0), 1.6),
+    WeightKind.SAMPLED: SampledWeight((0.0, 1.0, 2.0), (0.2, 1.0, 0.5), repeat=True),
+    WeightKind.FUNCTION: FunctionWeight(lambda t: np.exp(np.sin(t)), period=2 * math.pi),
+}
+
+
+@pytest.mark.parametrize("kind", WeightKind)
+def test_the_edges_of_an_agent_have_the_value_of_the_data(kind):
+    wave = ONE_OF_EACH[kind]
+    for end in (0.1, 2.7):
+        weights = hm.simulate(weights_block([wave, wave]), end)["weights"]
+        np.testing.assert_allclose(weights[-1], float(wave.value(end)), rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    "kind", [kind for kind in WeightKind if issubclass(ONE_OF_EACH[kind].automaton, ForeseenWeights)]
+)
+@given(start=st.floats(0.0, 20.0), span=st.floats(0.0, 5.0), weight_map=st.sampled_from(list(WeightMap)))
+@settings(max_examples=30, deadline=None)
+@pytest.mark.filterwarnings("ignore::FutureWarning")  # casadi announces a choice of numpy behaviour
+def test_one_formula_serves_numbers_arrays_and_symbols(kind, start, span, weight_map):
+    casadi = pytest.importorskip("casadi")
+    wave = ONE_OF_EACH[kind]
+    carrier = replace(wave, map=weight_map).carrier if isinstance(wave, GatedSine) else wave.carrier
+    a, b = casadi.SX.sym("a"), casadi.SX.sym("b")
+    traced = casadi.Function("traced", [a, b], [carrier.value(a), carrier.integral(a, b)])
+    numbers = [float(carrier.value(start)), float(carrier.integral(start, start + span))]
+    assert [float(found) for found in traced(start, start + span)] == pytest.approx(numbers, rel=1e-13, abs=1e-13)
+    times = np.array([start, start + span])
+    arrays = [carrier.value(times)[0], carrier.integral(times[:1], times[1:])[0]]
+    assert arrays == pytest.approx(numbers, rel=1e-14, abs=1e-15)
 
 
 def matlab_square(angle, duty_percent):
