@@ -165,6 +165,8 @@ def test_only_inputs_and_what_an_importer_integrates_are_set_while_running(label
         at_start = {"instantiated", "initialization"}
         for name, modes in (("limit_a", at_start), ("a", {*at_start, "continuous"}), ("count_a", at_start)):
             assert (mode, component.try_set(name, 1)) == (mode, OK if mode in modes else ERROR)
+            if mode in ("event", "step", "continuous") and mode not in modes:
+                assert f"'{name}' cannot be set" in component.errors[-1]
         for name in ("time", "der(a)"):
             assert component.try_set(name, 1.0) == ERROR
         assert all(component.binary.function("Set")[:7] in text for text in component.errors)
