@@ -1,4 +1,5 @@
-/* The engine proper: the flow through time events, prediction, and advancing to a target. */
+/* A run from one target to the next: the algorithm of docs/semantics.md, whose lines are named here and in jumps.c,
+   flow.c and locate.c, and what a prediction spares of it. */
 #include "parts.h"
 
 static bool too_many_steps(Engine *engine)
@@ -9,26 +10,32 @@ static bool too_many_steps(Engine *engine)
                        ADVANCE_STEPS, *engine->live.time, engine->model->name);
 }
 
-static Advance advance_locating(Engine *engine, double start, EventPolicy policy, size_t *budget)
+/* The run is over where a flow cannot go on. */
+static Advance end_with(Engine *engine, FlowEnd end)
+{
+    if (end == FLOW_BUDGET)
+        too_many_steps(engine);
+    engine_end_run(engine);
+    return ADVANCE_ENDED;
+}
+
+/* Lines 2 to 5: flow to the first event (10 to 18) and jump (6 to 9) in turn, from `start` to the target. */
+static Advance run(Engine *engine, double start, EventPolicy policy, size_t *budget)
 {
     for (;;) {
         FlowEnd end = engine_flow(engine, &engine->live, engine->target, true, budget);
         bool at_target = *engine->live.time >= engine->target;
-        if (end == FLOW_REACHED)
+        if (end == FLOW_REACHED) /* line 4 */
             return ADVANCE_REACHED;
         if (end == FLOW_CHANGED)
             continue;
-        if (end == FLOW_BUDGET)
-            too_many_steps(engine);
-        if (end != FLOW_EVENT) {
-            engine_end_run(engine);
-            return ADVANCE_ENDED;
-        }
+        if (end != FLOW_EVENT)
+            return end_with(engine, end);
         if (policy == EVENTS_STOP || (policy == EVENTS_INSIDE_BEFORE_END && at_target))
             return at_target ? ADVANCE_EVENT_AT_TARGET : ADVANCE_EVENT_BEFORE;
         /* Every round costs budget, so that jumps without progress end as well. */
         *budget -= *budget > 0;
-        if (!engine_jump_all(engine))
+        if (!engine_jump_all(engine)) /* line 3 */
             return ADVANCE_ENDED;
         /* A jump of its own is no surprise. */
         engine->status->settled = true;
@@ -36,6 +43,17 @@ static Advance advance_locating(Engine *engine, double start, EventPolicy policy
         if (policy == EVENTS_STOP_AFTER && now > start && engine->target - now > engine_one_instant(engine, now))
             return ADVANCE_EVENT_BEFORE;
     }
+}
+
+/* At an event that was predicted, where the importer takes it: at the target, if that is the same instant. */
+static bool stays_at_event(Engine *engine, EventPolicy policy, Advance *advance)
+{
+    double event = *engine->live.time, target = engine->target;
+    bool at_target = target <= event + engine_one_instant(engine, event);
+    if (at_target && target > event)
+        engine_flow_past_event(engine, target);
+    *advance = at_target ? ADVANCE_EVENT_AT_TARGET : ADVANCE_EVENT_BEFORE;
+    return at_target || policy == EVENTS_STOP;
 }
 
 double engine_target(const Engine *engine)
@@ -59,7 +77,9 @@ Advance engine_advance(Engine *engine, double target, EventPolicy policy)
 {
     size_t budget = ADVANCE_STEPS;
     double start = *engine->live.time;
+    bool outside = policy == EVENTS_STOP || policy == EVENTS_INSIDE_BEFORE_END;
     FlowEnd end = FLOW_REACHED;
+    Advance advance;
     if (engine->status->ending != ENDED_NOT)
         return ADVANCE_ENDED;
     engine->status->jumps_taken = 0;
@@ -71,23 +91,9 @@ Advance engine_advance(Engine *engine, double target, EventPolicy policy)
         engine->status->has_segment = false;
     engine_look_ahead(engine);
     Progress progress = engine_follow_prediction(engine, policy, &budget, &end);
-    if (progress == ON_THE_WAY && end == FLOW_REACHED)
-        return ADVANCE_REACHED;
-    if (progress == ON_THE_WAY && end != FLOW_CHANGED) {
-        if (end == FLOW_BUDGET)
-            too_many_steps(engine);
-        engine_end_run(engine);
-        return ADVANCE_ENDED;
-    }
-    if (progress == AT_PREDICTED_EVENT && (policy == EVENTS_STOP || policy == EVENTS_INSIDE_BEFORE_END)) {
-        double event = *engine->live.time;
-        bool at_target = target <= event + engine_one_instant(engine, event);
-        if (at_target && target > event)
-            engine_flow_past_event(engine, target);
-        if (at_target)
-            return ADVANCE_EVENT_AT_TARGET;
-        if (policy == EVENTS_STOP)
-            return ADVANCE_EVENT_BEFORE;
-    }
-    return advance_locating(engine, start, policy, &budget);
+    if (progress == ON_THE_WAY && end != FLOW_CHANGED)
+        return end == FLOW_REACHED ? ADVANCE_REACHED : end_with(engine, end);
+    if (progress == AT_PREDICTED_EVENT && outside && stays_at_event(engine, policy, &advance))
+        return advance;
+    return run(engine, start, policy, &budget);
 }

@@ -1,4 +1,4 @@
-/* The flow of a point through time events, up to a time or to the first event. */
+/* The flow of a point through time events, up to a time or to the first event: lines 10 to 15 of docs/semantics.md. */
 #include <float.h>
 #include <math.h>
 
@@ -39,15 +39,14 @@ static bool go_on(Engine *engine)
 static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, double piece_end, bool locate,
                           size_t *budget)
 {
-    double end = fmin(limit, piece_end);
-    double level = 0.0;
-    engine_clear_levels(engine, point);
-    if (!engine_step_begin(engine, point) || (locate && !engine_flow_may_begin(engine, point, &level)))
+    double end = fmin(limit, piece_end), level = 0.0;
+    if (!engine_step_begin(engine, point) || (locate && !engine_flow_may_begin(engine, point, &level))) /* line 10 */
         return FLOW_PROBLEM;
+    engine_clear_levels(engine, point); /* line 11 */
     if (*point->time == engine->status->start_time ||
         engine_largest_state(engine, point, point->x) <= DBL_MIN / engine->model->scales.absolute)
         engine_raise_floor(engine, point, end);
-    while (*point->time < end) {
+    while (*point->time < end) { /* lines 12 to 14 */
         if (*budget == 0)
             return FLOW_BUDGET;
         --*budget;
@@ -59,7 +58,7 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
             FlowEnd found = engine_locate_event(engine, point, level, piece_end);
             if (found != FLOW_REACHED)
                 return found;
-            if (engine->step.t1 >= end && !engine_raise_levels(engine, point, engine->step.t1))
+            if (engine->step.t1 >= end && !engine_raise_levels(engine, point, engine->step.t1)) /* line 15 */
                 return FLOW_PROBLEM;
         }
         engine_step_commit(engine, point);
@@ -98,10 +97,10 @@ FlowEnd engine_flow(Engine *engine, const Point *point, double limit, bool locat
             return FLOW_EVENT;
         if (*point->time >= limit)
             return FLOW_REACHED;
-        double piece_end = engine_next_time(engine, point, locate, true);
+        double piece_end = engine_next_time(engine, point, locate, true); /* line 11 */
         FlowEnd result = flow_piece(engine, point, limit, piece_end, locate, budget);
         bool near = piece_end <= limit && piece_end - *point->time <= engine_one_instant(engine, piece_end);
-        if (result == FLOW_EVENT && near && *point->time < piece_end)
+        if (result == FLOW_EVENT && near && *point->time < piece_end) /* line 15 */
             result = go_on_to(engine, point, piece_end, budget);
         /* At an event the loop begins anew: a breakpoint of the same instant may come before it. */
         if (result != FLOW_REACHED && result != FLOW_EVENT)

@@ -1,4 +1,4 @@
-/* Jumps: which one is enabled, what it does, and how many there may be. */
+/* Jumps: which one is due, what it does, and how many there may be: lines 6 to 9 of docs/semantics.md. */
 #include <math.h>
 #include <string.h>
 
@@ -76,7 +76,7 @@ bool engine_evaluate_times(Engine *engine, const Point *point)
     return true;
 }
 
-/* The jump of a time event must move its time on, though not yet past the present. */
+/* Line 8: the jump of a time event must move its time on, though not yet past the present. */
 static bool moved_on(Engine *engine, size_t jump, double was, const Point *point)
 {
     if (!engine_evaluate_times(engine, point))
@@ -154,7 +154,7 @@ static bool flow_is_over(Engine *engine, const Point *point, bool *over)
     return *over || (engine_step_begin(engine, point) && engine_leads_out(engine, point, margin, over));
 }
 
-/* The first enabled visible jump at the point, n_jumps if there is none. */
+/* Line 6. */
 bool engine_first_enabled(Engine *engine, const Point *point, size_t *jump)
 {
     const Model *m = engine->model;
@@ -179,7 +179,7 @@ bool engine_first_enabled(Engine *engine, const Point *point, size_t *jump)
     return true;
 }
 
-/* Counts a visible jump; false if there are too many. */
+/* Counts a visible jump; false if there are too many (line 9). */
 static bool count_jump(Engine *engine, size_t jump)
 {
     engine->status->jumps_time = *engine->live.time;
@@ -187,6 +187,7 @@ static bool count_jump(Engine *engine, size_t jump)
     return engine_zeno_record(engine, jump);
 }
 
+/* Lines 7 to 9. */
 static bool take_jump(Engine *engine, size_t jump)
 {
     engine_changed(engine);

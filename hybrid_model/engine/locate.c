@@ -1,4 +1,4 @@
-/* The event that ends a flow on one step of the solver.
+/* The event that ends a flow on one step of the solver: lines 16 to 18 of docs/semantics.md.
 
    A guard is crossed on (t0, t1] when its margin goes from negative to zero or above.  Crossings
    close enough are one instant, the latest of them; a flow that ends shortly before
@@ -247,13 +247,13 @@ FlowEnd engine_locate_event(Engine *engine, const Point *point, double level, do
     }
     if (!refuse_indicators(engine, &search))
         return FLOW_PROBLEM;
-    double guard = INFINITY, leaving = INFINITY;
+    double guard = INFINITY, leaving = INFINITY; /* lines 16 and 17 */
     bool has_guard = engine_first_guard(&search, &guard);
     bool leaves = m->has_flow_set && !search.failed && engine_first_exit(&search, &leaving);
     if (search.failed)
         return FLOW_PROBLEM;
     if (has_guard && (!leaves || guard <= leaving + engine_one_instant(engine, leaving))) {
-        guard = common_time(&search, guard);
+        guard = common_time(&search, guard); /* line 18 */
         if (search.failed ||
             (guard + engine_one_instant(engine, guard) > piece_end && !engine_raise_levels(engine, point, guard)))
             return FLOW_PROBLEM;

@@ -3,7 +3,7 @@
 After E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I", section II.4: a short Euler step
 shows how the derivative changes, and the step is chosen so that the error is about the tolerance. Their formula, which
 SciPy uses, compares the derivative with fixed numbers and so means another step in milliseconds than in seconds; here
-only ratios occur. The C engine of exported FMUs (hybrid_model/engine/integrate.c) does the same.
+only ratios occur. The C engine of exported FMUs (hybrid_model/engine/first_step.c) does the same.
 """
 
 from __future__ import annotations
