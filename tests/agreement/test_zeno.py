@@ -3,12 +3,10 @@
 Each run is a child process under a time limit: if the guard failed, the test would too, and not the whole suite.
 """
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from catalogue import cases
+from child_python import run_child
 
 from hybrid_model.models import BouncingBall
 
@@ -30,9 +28,7 @@ print(messages[-1] if messages else "silent")
 
 @pytest.mark.parametrize(("events", "early"), [("0", "0"), ("1", "0"), ("1", "1")])
 def test_fmpy_run_beyond_the_accumulation_ends(events, early, exported):
-    command = [sys.executable, "-c", SIMULATE, str(exported(BouncingBall(), "ball")), events, early]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
-    end, message = done.stdout.strip().splitlines()[-2:]
+    end, message = run_child(SIMULATE, exported(BouncingBall(), "ball"), events, early).splitlines()[-2:]
     assert "accumulate at t = 2.5586" in message
     if not end.startswith("refused"):
         time, lowest = map(float, end.split())
@@ -64,9 +60,7 @@ except Exception as error:
 
 
 def test_one_long_step_ends_at_the_accumulation_and_further_steps_are_refused(exported):
-    command = [sys.executable, "-c", LOW_LEVEL, str(exported(BouncingBall(), "ball"))]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
-    first, height, message, last = done.stdout.strip().splitlines()[-4:]
+    first, height, message, last = run_child(LOW_LEVEL, exported(BouncingBall(), "ball")).splitlines()[-4:]
     terminate, reached = first.split()
     assert terminate == "True"
     assert float(reached) == pytest.approx(ACCUMULATION, abs=1e-3)
@@ -88,11 +82,9 @@ except Exception as error:
 @pytest.mark.parametrize(("fmi", "kind"), [("2.0", "CoSimulation"), ("2.0", "ModelExchange"), ("3.0", "ModelExchange")])
 def test_other_versions_and_kinds_in_fmpy_end_as_well(fmi, kind, exported):
     """FMI 2.0 by fmi2Discard with Terminated; Model Exchange by terminateSimulation, under the importer's CVode."""
-    path = exported(BouncingBall(), "ball", fmi)
-    command = [sys.executable, "-c", INTEGRATED, str(path), kind]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
-    assert "Zeno: " in done.stdout
-    end = done.stdout.strip().splitlines()[-1]
+    told = run_child(INTEGRATED, exported(BouncingBall(), "ball", fmi), kind)
+    assert "Zeno: " in told
+    end = told.splitlines()[-1]
     if not end.startswith("refused"):
         time, lowest = map(float, end.split())
         # CVode's own relative tolerance is 1e-5 there.
@@ -111,9 +103,6 @@ except Exception as error:
 
 def test_a_run_that_starts_later_than_its_clock_names_the_remedy(exported):
     """Samples are due at 0, 0.13, ... s, which is millions of them at 1e6 s."""
-    path = exported(cases()["analog_digital_loop"].automaton, "analog_digital_loop")
-    done = subprocess.run(
-        [sys.executable, "-c", LATE, str(path)], capture_output=True, text=True, timeout=60, check=True
-    )
-    assert "declare the clock's state with computed=True and let start_map give the next time to come." in done.stdout
-    assert done.stdout.strip().endswith("refused")
+    told = run_child(LATE, exported(cases()["analog_digital_loop"].automaton, "analog_digital_loop"))
+    assert "declare the clock's state with computed=True and let start_map give the next time to come." in told
+    assert told.endswith("refused")

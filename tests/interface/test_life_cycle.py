@@ -6,11 +6,10 @@
 import ctypes as c
 import math
 import random
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from child_python import run_child
 from fmi_driver.binary import ERROR, OK
 from fmi_driver.calls import TABLE
 from fmi_driver.runs import Walk, advance
@@ -19,7 +18,6 @@ from witnesses import Mix, Ramps
 import hybrid_model as hm
 from hybrid_model.models import BouncingBall, Thermostat
 
-SUPPORT = str(Path(__file__).parents[1] / "support")
 POINTS = [0.0, 0.2, 0.45, 0.7, 1.0]
 STARTS = {"limit_a": 0.3, "rate_b": 2.0, "limit_b": 1.1, "first": 0.45, "period": 0.2}
 MODES = ("instantiated", "initialization", "event", "step", "terminated")
@@ -159,18 +157,10 @@ def test_access_that_cannot_be_is_refused_as_a_whole(make):
         assert component.bytes() == before
 
 
-def run_child(code, *arguments, seconds=20):
-    command = [sys.executable, "-c", code, *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=seconds, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
-
-
 def test_a_step_without_end_ends(binary):
     """No stop time, a model that never rests and a step of 1e9 s: the FMU gives up in bounded time and says so."""
-    code = f"""
+    code = """
 import sys
-sys.path.insert(0, {SUPPORT!r})
 from fmi_driver.binary import Binary
 from fmi_driver.component import Component
 component = Component(Binary(sys.argv[1]))
@@ -185,9 +175,8 @@ assert component.step(step.time, 1.0).status == 3
 
 # Resources.
 
-LEAKS = f"""
+LEAKS = """
 import os, sys
-sys.path.insert(0, {SUPPORT!r})
 from fmi_driver.binary import Binary
 from fmi_driver.journey import instance
 from fmi_driver.runs import advance

@@ -2,20 +2,16 @@
 
 import ctypes as c
 import hashlib
-import os
 import struct
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
+from child_python import run_child
 from fmi_driver.binary import ERROR, OK
 from fmi_driver.journey import SETTINGS, Journey
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from witnesses import Mix, Ramps
 
-SUPPORT = str(Path(__file__).parents[1] / "support")
 HEADER, CHECKSUM = 64, slice(24, 32)
 POINTS = [0.31, 0.52, 0.97]
 STARTS = {"limit_a": 0.3, "rate_b": 2.0, "limit_b": 1.1, "first": 0.45, "period": 0.2}
@@ -48,7 +44,6 @@ def test_another_instance_continues_bit_for_bit(label, make):
 CHILD = f"""
 import hashlib, sys
 from pathlib import Path
-sys.path.insert(0, {SUPPORT!r})
 from fmi_driver.binary import OK, Binary
 from fmi_driver.journey import Journey, instance
 path, label, task, file = sys.argv[1:]
@@ -74,11 +69,8 @@ print(hashlib.sha256(component.serialize(component.save())).hexdigest())
 
 
 def child(path, label, task, file, seed):
-    command = [sys.executable, "-c", CHILD, str(path), label, task, str(file)]
-    environment = os.environ | {"PYTHONHASHSEED": str(seed), "PADDING": "x" * 100 * seed}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, env=environment)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.splitlines()
+    environment = {"PYTHONHASHSEED": str(seed), "PADDING": "x" * 100 * seed}
+    return run_child(CHILD, path, label, task, file, seconds=120, **environment).splitlines()
 
 
 @pytest.mark.parametrize("label", ["2.0 CS", "3.0 CS", "3.0 ME"])
@@ -157,11 +149,10 @@ def test_random_damage_is_refused(at, byte, tail, make):
 FORGED = """
 import random, struct, sys
 from pathlib import Path
-sys.path.insert(0, {support!r})
 from fmi_driver.binary import OK, Binary
 from fmi_driver.journey import Journey, instance
-path, label, seed = sys.argv[1:]
-rng = random.Random(int(seed))
+path, label, rounds = sys.argv[1:]
+rng = random.Random(int(rounds))
 binary = Binary(path)
 component = Journey(instance(binary, label), 0.0, 2.0).component
 data = component.serialize(component.save())
@@ -175,7 +166,7 @@ def checksum(block):
     return struct.pack("<Q", total)
 
 taken = 0
-for _ in range({rounds}):
+for _ in range(int(rounds)):
     forged = bytearray(data)
     for _ in range(rng.choice([1, 1, 1, 3, 30])):
         at = 64 + 8 * rng.randrange((len(data) - 64) // 8)
@@ -218,12 +209,8 @@ MANY = {label: 2000 if setting["kind"] == "me" else 150 for label, setting in SE
 )
 def test_forged_bytes_with_a_right_checksum_do_no_harm(label, rounds, binary):
     """Whoever can compute the checksum can put in anything: no crash, no hang, and a reset heals all."""
-    fmi = SETTINGS[label]["fmi"]
-    script = FORGED.format(support=SUPPORT, rounds=rounds)
-    command = [sys.executable, "-c", script, str(binary(Mix, fmi).fmu), label, str(rounds)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60 + rounds)
-    assert done.returncode == 0, done.stderr[-2000:]
-    _, taken, _, equal = done.stdout.split()
+    path = binary(Mix, SETTINGS[label]["fmi"]).fmu
+    _, taken, _, equal = run_child(FORGED, path, label, rounds, seconds=60 + rounds).split()
     assert int(taken) > rounds // 10
     assert equal == "True"
 

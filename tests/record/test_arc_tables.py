@@ -1,11 +1,11 @@
 """Samples as plain arrays, CSV files, DataFrames and Datasets; all hold the same numbers."""
 
 import builtins
-import subprocess
 import sys
 
 import numpy as np
 import pytest
+from child_python import run_child
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
@@ -217,5 +217,4 @@ def test_without_the_packages_the_remedy_is_told(ball, monkeypatch, package, met
 
 def test_the_packages_are_imported_only_when_asked_for():
     code = "import hybrid_model, sys; print({'pandas', 'xarray'} & set(sys.modules))"
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == "set()"
+    assert run_child(code) == "set()"

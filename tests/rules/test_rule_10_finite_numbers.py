@@ -2,11 +2,10 @@
 
 import math
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
+from child_python import run_child
 from small_automata import Corridor, Ramp, Timer
 
 import hybrid_model as hm
@@ -123,8 +122,7 @@ for bad in (float("nan"), float("inf")):
 def test_flow_maps_end_with_an_error_and_never_hang(method):
     # A child with a time limit: some of SciPy's steppers loop for ever on derivatives that are not finite.
     code = FLOW.replace("METHOD", method)
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30, check=True)
-    told = run.stdout.splitlines()
+    told = run_child(code, seconds=30).splitlines()
     assert len(told) == 4
     for line in told:
         assert re.match(r"Spoilt: .*\by = (nan|inf) at t = ", line)

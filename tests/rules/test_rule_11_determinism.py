@@ -1,10 +1,8 @@
 """Rule 11: same inputs, same bits."""
 
-import subprocess
-import sys
-
 import numpy as np
 import pytest
+from child_python import run_child
 from small_automata import Ramp
 
 import hybrid_model as hm
@@ -50,14 +48,7 @@ def test_another_process_with_another_hash_seed_gives_the_same_bits():
         "arc = hm.simulate(pair, 2.0)\n"
         "print(hashlib.sha256(b''.join([arc.t.tobytes(), arc['a.h'].tobytes(), arc['b.v'].tobytes()])).hexdigest())\n"
     )
-    seeds = ("0", "1")
-    results = {
-        subprocess.run(
-            [sys.executable, "-c", code], env={"PYTHONHASHSEED": seed}, capture_output=True, text=True, check=True
-        ).stdout
-        for seed in seeds
-    }
-    assert len(results) == 1
+    assert len({run_child(code, PYTHONHASHSEED=seed) for seed in ("0", "1")}) == 1
 
 
 def test_a_copy_of_an_execution_goes_on_by_itself_and_alike():
