@@ -188,12 +188,67 @@ extern void* PyLong_FromLong(long);
 API void* fmi3Unused(void) { Py_Initialize(); return PyLong_FromLong(1); }
 #endif
 
+/* What both versions have; FMI 3.0 passes further numbers of values, which are not looked at. */
+#if FMI == 3
+#define NAMED(NAME2, NAME3) fmi3##NAME3
+typedef bool Truth;
+#else
+#define NAMED(NAME2, NAME3) fmi2##NAME2
+typedef int Truth;
+#endif
+#define BOTH(NAME) NAMED(NAME, NAME)
+API void BOTH(FreeInstance)(State* s) { free(s); }
+API int BOTH(ExitInitializationMode)(State* s) { s->initializing = 0; return OK; }
+API int BOTH(EnterEventMode)(State* s) { (void)s; return OK; }
+API int BOTH(EnterContinuousTimeMode)(State* s) { (void)s; return OK; }
+API int BOTH(Terminate)(State* s) { (void)s; return OK; }
+API int BOTH(Reset)(State* s) { reset(s); return OK; }
+API int NAMED(GetReal, GetFloat64)(State* s, const uint32_t r[], size_t n, double v[]) {
+    for (size_t i = 0; i < n; i++) if (get(s, r[i], v + i)) return ERROR;
+    return OK;
+}
+API int NAMED(SetReal, SetFloat64)(State* s, const uint32_t r[], size_t n, const double v[]) {
+    for (size_t i = 0; i < n; i++) if (set(s, r[i], v[i])) return ERROR;
+    return OK;
+}
+API int NAMED(GetFMUstate, GetFMUState)(State* s, void** out) { return copy(s, out); }
+API int NAMED(SetFMUstate, SetFMUState)(State* s, void* from) { return put_back(s, from); }
+API int NAMED(FreeFMUstate, FreeFMUState)(State* s, void** state) { (void)s; free(*state); *state = NULL; return OK; }
+API int NAMED(SerializedFMUstateSize, SerializedFMUStateSize)(State* s, void* state, size_t* n) {
+    (void)s; (void)state;
+    *n = sizeof(State);
+    return OK;
+}
+API int NAMED(SerializeFMUstate, SerializeFMUState)(State* s, void* state, uint8_t* out, size_t n) {
+    (void)s;
+    memcpy(out, state, n);
+    return OK;
+}
+API int NAMED(DeSerializeFMUstate, DeserializeFMUState)(State* s, const uint8_t* in, size_t n, void** out) {
+    copy(s, out);
+    memcpy(*out, in, n);
+#ifdef FAULT_SERIALIZE
+    ((State*)*out)->x += 1e-2;
+#endif
+    return OK;
+}
+API int BOTH(SetTime)(State* s, double t) { s->t = t; return OK; }
+API int BOTH(SetContinuousStates)(State* s, const double x[], size_t n) { (void)n; s->x = x[0]; return OK; }
+API int BOTH(GetContinuousStates)(State* s, double x[], size_t n) { (void)n; x[0] = s->x; return OK; }
+API int BOTH(GetNominalsOfContinuousStates)(State* s, double x[], size_t n) { (void)s; (void)n; x[0] = 1.0; return OK; }
+API int NAMED(GetDerivatives, GetContinuousStateDerivatives)(State* s, double x[], size_t n) { (void)n; return get(s, 2, x); }
+API int BOTH(GetEventIndicators)(State* s, double z[], size_t n) { (void)n; z[0] = s->x - 0.5; return OK; }
+API int BOTH(CompletedIntegratorStep)(State* s, Truth no, Truth* event, Truth* end) {
+    (void)s; (void)no;
+    *event = *end = 0;
+    return OK;
+}
+
 #if FMI == 3
 API const char* fmi3GetVersion(void) { return "3.0"; }
 API void* fmi3InstantiateCoSimulation(const char* name, const char* token, const char* place) { (void)name; return make(token, place); }
 API void* fmi3InstantiateModelExchange(const char* name, const char* token, const char* place) { (void)name; return make(token, place); }
 API void* fmi3InstantiateScheduledExecution(const char* name, const char* token, const char* place) { (void)name; return make(token, place); }
-API void fmi3FreeInstance(State* s) { free(s); }
 API int fmi3EnterInitializationMode(State* s, bool d, double tol, double start, bool limited, double stop) {
     (void)d; (void)tol;
     s->initializing = 1;
@@ -201,25 +256,11 @@ API int fmi3EnterInitializationMode(State* s, bool d, double tol, double start, 
     if (limited) s->stop = stop;
     return OK;
 }
-API int fmi3ExitInitializationMode(State* s) { s->initializing = 0; return OK; }
-API int fmi3EnterEventMode(State* s) { (void)s; return OK; }
 API int fmi3EnterStepMode(State* s) {
 #ifdef FAULT_NEEDS_EVENT_MODE
     s->memory = -1.0;
 #endif
     (void)s;
-    return OK;
-}
-API int fmi3Terminate(State* s) { (void)s; return OK; }
-API int fmi3Reset(State* s) { reset(s); return OK; }
-API int fmi3GetFloat64(State* s, const uint32_t r[], size_t n, double v[], size_t nv) {
-    (void)nv;
-    for (size_t i = 0; i < n; i++) if (get(s, r[i], v + i)) return ERROR;
-    return OK;
-}
-API int fmi3SetFloat64(State* s, const uint32_t r[], size_t n, const double v[], size_t nv) {
-    (void)nv;
-    for (size_t i = 0; i < n; i++) if (set(s, r[i], v[i])) return ERROR;
     return OK;
 }
 API int fmi3GetClock(State* s, const uint32_t r[], size_t n, bool v[]) {
@@ -263,19 +304,6 @@ API int fmi3DoStep(State* s, double t, double h, bool no, bool* event, bool* end
     *last = s->t = t;
 #endif
     return status;
-}
-API int fmi3GetFMUState(State* s, void** out) { return copy(s, out); }
-API int fmi3SetFMUState(State* s, void* from) { return put_back(s, from); }
-API int fmi3FreeFMUState(State* s, void** state) { (void)s; free(*state); *state = NULL; return OK; }
-API int fmi3SerializedFMUStateSize(State* s, void* state, size_t* n) { (void)s; (void)state; *n = sizeof(State); return OK; }
-API int fmi3SerializeFMUState(State* s, void* state, uint8_t* out, size_t n) { (void)s; memcpy(out, state, n); return OK; }
-API int fmi3DeserializeFMUState(State* s, const uint8_t* in, size_t n, void** out) {
-    copy(s, out);
-    memcpy(*out, in, n);
-#ifdef FAULT_SERIALIZE
-    ((State*)*out)->x += 1e-2;
-#endif
-    return OK;
 }
 API int fmi3GetDirectionalDerivative(State* s, const uint32_t r[], size_t n, const uint32_t k[], size_t nk, const double seed[],
                                      size_t ns, double out[], size_t no) {
@@ -337,13 +365,6 @@ API int fmi3GetVariableDependencies(State* s, uint32_t r, size_t e[], uint32_t k
 #endif
     return CLAIMED;
 }
-API int fmi3EnterContinuousTimeMode(State* s) { (void)s; return OK; }
-API int fmi3SetTime(State* s, double t) { s->t = t; return OK; }
-API int fmi3SetContinuousStates(State* s, const double x[], size_t n) { (void)n; s->x = x[0]; return OK; }
-API int fmi3GetContinuousStates(State* s, double x[], size_t n) { (void)n; x[0] = s->x; return OK; }
-API int fmi3GetNominalsOfContinuousStates(State* s, double x[], size_t n) { (void)s; (void)n; x[0] = 1.0; return OK; }
-API int fmi3GetContinuousStateDerivatives(State* s, double x[], size_t n) { (void)n; return get(s, 2, x); }
-API int fmi3GetEventIndicators(State* s, double z[], size_t n) { (void)n; z[0] = s->x - 0.5; return OK; }
 API int fmi3GetNumberOfContinuousStates(State* s, size_t* n) { (void)s; *n = 1; return OK; }
 API int fmi3GetNumberOfEventIndicators(State* s, size_t* n) {
     (void)s;
@@ -353,7 +374,6 @@ API int fmi3GetNumberOfEventIndicators(State* s, size_t* n) {
 #endif
     return OK;
 }
-API int fmi3CompletedIntegratorStep(State* s, bool no, bool* event, bool* end) { (void)s; (void)no; *event = *end = false; return OK; }
 API int fmi3ActivateModelPartition(State* s, uint32_t clock, double t) { (void)clock; s->t = t; s->x *= 0.5; return OK; }
 #else
 API const char* fmi2GetVersion(void) { return "2.0"; }
@@ -362,7 +382,6 @@ API void* fmi2Instantiate(const char* name, int kind, const char* token, const c
     (void)name; (void)kind;
     return make(token, place);
 }
-API void fmi2FreeInstance(State* s) { free(s); }
 API int fmi2SetupExperiment(State* s, int d, double tol, double start, int limited, double stop) {
     (void)d; (void)tol;
     s->t = start;
@@ -370,19 +389,6 @@ API int fmi2SetupExperiment(State* s, int d, double tol, double start, int limit
     return OK;
 }
 API int fmi2EnterInitializationMode(State* s) { s->initializing = 1; return OK; }
-API int fmi2ExitInitializationMode(State* s) { s->initializing = 0; return OK; }
-API int fmi2EnterEventMode(State* s) { (void)s; return OK; }
-API int fmi2EnterContinuousTimeMode(State* s) { (void)s; return OK; }
-API int fmi2Terminate(State* s) { (void)s; return OK; }
-API int fmi2Reset(State* s) { reset(s); return OK; }
-API int fmi2GetReal(State* s, const unsigned r[], size_t n, double v[]) {
-    for (size_t i = 0; i < n; i++) if (get(s, r[i], v + i)) return ERROR;
-    return OK;
-}
-API int fmi2SetReal(State* s, const unsigned r[], size_t n, const double v[]) {
-    for (size_t i = 0; i < n; i++) if (set(s, r[i], v[i])) return ERROR;
-    return OK;
-}
 typedef struct { int again, end, nominals, values, defined; double next; } Info;
 API int fmi2NewDiscreteStates(State* s, Info* info) {
     (void)s;
@@ -401,12 +407,6 @@ API int fmi2DoStep(State* s, double t, double h, int no) {
 }
 API int fmi2GetRealStatus(State* s, int kind, double* v) { (void)kind; *v = s->t; return OK; }
 API int fmi2GetBooleanStatus(State* s, int kind, int* v) { (void)s; (void)kind; *v = 1; return OK; }
-API int fmi2GetFMUstate(State* s, void** out) { return copy(s, out); }
-API int fmi2SetFMUstate(State* s, void* from) { return put_back(s, from); }
-API int fmi2FreeFMUstate(State* s, void** state) { (void)s; free(*state); *state = NULL; return OK; }
-API int fmi2SerializedFMUstateSize(State* s, void* state, size_t* n) { (void)s; (void)state; *n = sizeof(State); return OK; }
-API int fmi2SerializeFMUstate(State* s, void* state, char* out, size_t n) { (void)s; memcpy(out, state, n); return OK; }
-API int fmi2DeSerializeFMUstate(State* s, const char* in, size_t n, void** out) { copy(s, out); memcpy(*out, in, n); return OK; }
 API int fmi2GetDirectionalDerivative(State* s, const unsigned r[], size_t n, const unsigned k[], size_t nk, const double seed[],
                                      double out[]) {
     for (size_t i = 0; i < n; i++) {
@@ -430,11 +430,4 @@ API int fmi2SetRealInputDerivatives(State* s, const unsigned r[], size_t n, cons
     (void)s; (void)n; (void)v;
     return r[0] == 7 && orders[0] == 1 ? CLAIMED : ERROR;
 }
-API int fmi2SetTime(State* s, double t) { s->t = t; return OK; }
-API int fmi2SetContinuousStates(State* s, const double x[], size_t n) { (void)n; s->x = x[0]; return OK; }
-API int fmi2GetContinuousStates(State* s, double x[], size_t n) { (void)n; x[0] = s->x; return OK; }
-API int fmi2GetNominalsOfContinuousStates(State* s, double x[], size_t n) { (void)s; (void)n; x[0] = 1.0; return OK; }
-API int fmi2GetDerivatives(State* s, double x[], size_t n) { (void)n; return get(s, 2, x); }
-API int fmi2GetEventIndicators(State* s, double z[], size_t n) { (void)n; z[0] = s->x - 0.5; return OK; }
-API int fmi2CompletedIntegratorStep(State* s, int no, int* event, int* end) { (void)s; (void)no; *event = *end = 0; return OK; }
 #endif

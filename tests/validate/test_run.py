@@ -48,7 +48,7 @@ FAULTS = [
     ("RESET", (2, 3), "run.reset"),
     ("REPEAT", (2, 3), "run.reset"),
     ("STATE", (2, 3), "run.state"),
-    ("SERIALIZE", (3,), "run.serialize"),
+    ("SERIALIZE", (2, 3), "run.serialize"),
     ("ITERATION", (2, 3), "run.iteration"),
     ("NEXT_TIME", (3,), "run.next_time"),
     ("PROGRESS", (3,), "run.progress"),
