@@ -109,14 +109,6 @@ def test_a_breakpoint_that_enables_a_guard_fires_it_at_the_breakpoint():
     assert arc.jumps[0].x_before[0] == pytest.approx(0.0, abs=1e-15)
 
 
-def test_a_time_event_that_does_not_move_on_is_an_error_that_names_it():
-    class Stuck(Timer):
-        transitions = (hm.TimeEvent("tick", Timer.next_time, lambda self, s: {}),)
-
-    with pytest.raises(hm.SimulationError, match=r"Stuck: time event 'tick' was due at 2 s .* move its time on"):
-        hm.simulate(Stuck(first=2.0), 3.0)
-
-
 def test_a_smooth_input_is_a_function_of_time():
     arc = hm.simulate(Store(), 2.0, inputs={"u": math.cos})
     assert arc.end.x == pytest.approx(math.sin(2.0), abs=1e-12)
