@@ -25,7 +25,7 @@ from hybrid_model.declare.variables import Kind
 from hybrid_model.models import BouncingBall, RelayHysteresis, Thermostat, TwoTank
 
 G, E = 9.81, 0.7
-SLOW = ("paper", "agent", "control", "vehicle")
+SLOW = ("paper", "agent", "control", "vehicle", "ring", "absolute", "moving_agents", "double_integrators")
 """Models of seconds: a quarter of their run is verified by default, the whole with the long tests."""
 
 
