@@ -95,8 +95,9 @@ class TestEveryKind:
     @given(wave=waveforms, t0=st.floats(-12, 12), span=st.floats(0.0, 6.0))
     @settings(max_examples=150, deadline=None)
     def test_integral_agrees_with_quadrature(self, wave, t0, span):
-        # Quadrature to 1e-11 on each of up to some 600 pieces.
-        assert float(wave.integral(t0, t0 + span)) == pytest.approx(by_quadrature(wave, t0, t0 + span), abs=1e-8)
+        # Quadrature to 1e-11 on each piece; rounding of a phase of up to some hundred adds about 1e-13.
+        allowed = 1e-11 * (10 + len(wave.breakpoints(t0, t0 + span)))
+        assert float(wave.integral(t0, t0 + span)) == pytest.approx(by_quadrature(wave, t0, t0 + span), abs=allowed)
 
     @given(wave=waveforms, t=st.lists(times, min_size=3, max_size=3))
     @settings(max_examples=150)
@@ -105,7 +106,7 @@ class TestEveryKind:
         whole, left, right = (float(wave.integral(*pair)) for pair in ((a, c), (a, b), (b, c)))
         assert whole == pytest.approx(left + right, abs=1e-9)
         assert float(wave.integral(c, a)) == pytest.approx(-whole, abs=1e-9)
-        assert left >= -1e-11
+        assert left >= -1e-12
 
     @given(wave=waveforms, t=times, cycles=st.integers(1, 4))
     @settings(max_examples=200)
