@@ -13,8 +13,9 @@ from hybrid_model.consensus.certificates.windows import BestWindow, RateForm, be
 from hybrid_model.consensus.exact.edge_domain import EdgeGains, edge_domain_gains, edge_domain_system
 from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum
 from hybrid_model.consensus.exact.periodic_edge_domain import PeriodicGains, period_map, periodic_gains
-from hybrid_model.consensus.excitation.joint import JointExcitation, joint_excitation, tree_excitations
+from hybrid_model.consensus.excitation.joint import JointExcitation, joint_excitation
 from hybrid_model.consensus.excitation.persistence import ExcitationConstants, WindowExtremes, scenario_excitation
+from hybrid_model.consensus.excitation.trees import tree_excitations
 from hybrid_model.consensus.graphs.digraphs import BalancedSwitching
 from hybrid_model.consensus.graphs.generators import (
     AgentGraph,

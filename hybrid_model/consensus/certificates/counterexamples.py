@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 import hybrid_model as hm
 from hybrid_model.consensus.certificates.gaps import frozen_gap, printed_gap
 from hybrid_model.consensus.certificates.rates import rate_of_contraction
-from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound, convergence_bound
 from hybrid_model.consensus.exact.floquet import floquet_spectrum
 from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import incidence, weighted_laplacian
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
-from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.runs.metrics import run_states
+from hybrid_model.consensus.runs.report import edge_norm, run_report
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
 from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
@@ -39,6 +40,7 @@ __all__ = [
     "partial_window",
     "printed_sum",
     "shrinking_gaps",
+    "signed_multipliers",
     "signed_weights",
     "valid_sum",
     "vanishing_weights",
@@ -105,8 +107,8 @@ def literal_excitation(weight: float = 10.0, window: float = 0.005) -> Counterex
     )
 
 
-def signed_weights() -> Counterexample:
-    """The example with the weights w = g, which are negative half of the time: largest multiplier over one cycle.
+def signed_multipliers() -> NDArray[np.float64]:
+    """Moduli of the multipliers of the example over one cycle with the weights w = g, negative half of the time.
 
     The absolute weights with the sign of the sine; on each half wave the flow is that of a constant Laplacian.
     """
@@ -120,11 +122,13 @@ def signed_weights() -> Counterexample:
             sign = np.sign(np.sin(waveforms[0].sine_rate * (piece.start + piece.end) / 2))
             values, vectors = np.linalg.eigh((factor * piece.amplitudes) @ factor.T)
             flow = (vectors * np.exp(-sign * carrier.integral(piece.start, piece.end) * values)) @ vectors.T @ flow
-    return Counterexample(
-        "Simulation section: consensus with the weights w = g, so no multiplier above 1",
-        1.0,
-        float(np.max(np.abs(np.linalg.eigvals(flow)))),
-    )
+    return np.asarray(np.abs(np.linalg.eigvals(flow)))
+
+
+def signed_weights() -> Counterexample:
+    """The example with the weights w = g: its largest multiplier over one cycle."""
+    claim = "Simulation section: consensus with the weights w = g, so no multiplier above 1"
+    return Counterexample(claim, 1.0, float(np.max(signed_multipliers())))
 
 
 def integrated_norm(parts: int = 3) -> Counterexample:
@@ -160,10 +164,7 @@ def partial_window(delta: float = 1.0, window: float = 1.0) -> Counterexample:
 
 def minimum_gap() -> Counterexample:
     """The printed minimum gap: two agents, w = k = 1, c = 0.5, x(0) = (0, 0.05), T = 0.05 (audit, section 6)."""
-    trigger = Trigger(TriggerKind.STATIC, 0.5)
-    scenario = _constant_network(((1, 2),), (0.0, 0.05), 1.0, trigger, 15.0)
-    bound = convergence_bound(scenario, BoundForm.PRINTED, window=0.05)
-    speed = bound.rho * float(np.linalg.norm(incidence(2, ((1, 2),)), 2))
+    scenario, bound, speed = _two_close_agents()
     gap = run_report(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time)).min_gap
     return Counterexample(
         "Eq. zeno dynamic upper bound: the minimum gap with kappa_1 + kappa_2",
@@ -176,10 +177,15 @@ def minimum_gap() -> Counterexample:
 
 def corrected_gap_without_kappa1() -> float:
     """The gap of `minimum_gap` with kappa_2 alone: the limit of the paper's own inequality, which holds [s]."""
+    _, bound, speed = _two_close_agents()
+    return frozen_gap(0.5, 0.0, speed * (bound.kappa2 or 0.0))
+
+
+def _two_close_agents() -> tuple[Scenario, ConvergenceBound, float]:
+    """The network of `minimum_gap`, its printed bound and ``rho ||D||``."""
     scenario = _constant_network(((1, 2),), (0.0, 0.05), 1.0, Trigger(TriggerKind.STATIC, 0.5), 15.0)
     bound = convergence_bound(scenario, BoundForm.PRINTED, window=0.05)
-    speed = bound.rho * float(np.linalg.norm(incidence(2, ((1, 2),)), 2))
-    return frozen_gap(0.5, 0.0, speed * (bound.kappa2 or 0.0))
+    return scenario, bound, bound.rho * float(np.linalg.norm(incidence(2, ((1, 2),)), 2))
 
 
 def derivative_at_own_event(scenario: Scenario, arc: hm.HybridArc, samples: int = 4000) -> Counterexample:
@@ -209,7 +215,8 @@ def derivative_at_own_event(scenario: Scenario, arc: hm.HybridArc, samples: int 
     broadcasts = np.array([arc.at(f"{name}.broadcast", times) for name in names])
     events = [np.concatenate(([0.0], times_)) for times_ in run_report(scenario, arc).event_times]
     last = np.array([own[np.searchsorted(own, times, side="right") - 1] for own in events])
-    norms = np.array([_edge_norms(D, arc, names, starts) for starts in last])
+    states = run_states(scenario, arc)
+    norms = np.array([edge_norm(scenario, states(starts)) for starts in last])
     worst = 0.0
     for column, t in enumerate(times):
         weights = scenario.edge_weights.value(float(t))
@@ -230,13 +237,6 @@ def derivative_on_a_path() -> Counterexample:
     trigger = Trigger(TriggerKind.STATIC, 0.5)
     scenario = _constant_network(((1, 2), (2, 3)), (0.0, 0.4, 1.0), 1.0, trigger, 6.0)
     return derivative_at_own_event(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time), 100)
-
-
-def _edge_norms(
-    D: NDArray[np.float64], arc: hm.HybridArc, names: list[str], times: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    states = np.array([arc.at(f"{name}.x", times) for name in names])
-    return np.asarray(np.linalg.norm(D.T @ states, axis=0))
 
 
 def shrinking_gaps(decay: float = 3.0, stop_time: float = 6.0) -> Counterexample:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hybrid_model import HybridArc
 from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.graphs.undirected import disagreement_basis
-from hybrid_model.consensus.laws.closed_loop import agent_name
+from hybrid_model.consensus.runs.metrics import run_states
 from hybrid_model.consensus.runs.report import edge_norm, run_report
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
@@ -77,8 +77,7 @@ def observe(
     shortest = None if gap is None else _shortest(scenario, gap)
     if decay is None:
         return Observation(shortest, None, None, *shown)
-    names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
-    states = np.array([arc.at(name, times) for name in names])
+    states = run_states(scenario, arc)(times)
     growth = np.exp(decay * times)
     share = edge_norm(scenario, free) * growth
     rounding = _STATE_TOLERANCE * edge_norm(scenario, np.asarray(scenario.network.initial)) * growth

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid_model.consensus.certificates.rates import rate_of_contraction, tree_contraction
-from hybrid_model.consensus.excitation.joint import tree_excitations
 from hybrid_model.consensus.excitation.persistence import ExcitationConstants, Signal, scenario_excitation
+from hybrid_model.consensus.excitation.trees import tree_excitations
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind

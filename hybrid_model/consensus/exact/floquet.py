@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from hybrid_model.consensus.exact.transition_grid import affordable_resolution, transition_grid
+from hybrid_model.consensus.exact.transition_grid import affordable_resolution, joined_flows, transition_grid
 from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.edge_weights import Piece
@@ -91,7 +91,7 @@ def _scaled_spectrum(scenario: Scenario, period: float) -> FloquetSpectrum:
     feeds the kept one. If that alone outlives the period, the rate comes out too small, never too large.
     """
     resolution = affordable_resolution(scenario, 0.0, period, _CELL, _MOST_CELLS)
-    flows = _mild_flows(transition_grid(scenario, 0.0, period, resolution).flows, max(1, int(_MILD / resolution)))
+    flows = joined_flows(transition_grid(scenario, 0.0, period, resolution).flows, max(1, int(_MILD / resolution)))
     basis, known = np.eye(flows.shape[1]), math.inf
     for _ in range(_SWEEPS):
         start, triangle, logarithm = basis, np.eye(len(basis)), 0.0
@@ -106,17 +106,6 @@ def _scaled_spectrum(scenario: Scenario, period: float) -> FloquetSpectrum:
             break
         known = exponent
     return FloquetSpectrum(period, scaled * math.exp(max(logarithm, -745.0)), -exponent / period, is_scaled=True)
-
-
-def _mild_flows(flows: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """Products of `count` consecutive flows."""
-    padding = -len(flows) % count
-    size = flows.shape[1]
-    parts = np.concatenate((flows, np.broadcast_to(np.eye(size), (padding, size, size)))).reshape(-1, count, size, size)
-    product = parts[:, 0]
-    for k in range(1, count):
-        product = parts[:, k] @ product
-    return product
 
 
 def transition_matrix(scenario: Scenario, t0: float, t1: float) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.carriers import Carrier
 from hybrid_model.consensus.weights.edge_weights import Piece
 
-__all__ = ["TransitionGrid", "affordable_resolution", "dose_between", "transition_grid"]
+__all__ = ["TransitionGrid", "affordable_resolution", "dose_between", "joined_flows", "transition_grid"]
 
 _MOST_PER_PIECE = 100_000
 _MOST_BLOCKS = 256
@@ -132,7 +132,7 @@ def transition_grid(
         flow = _flows(piece, gain, factor, times, dose)
         if joined and each >= _TOGETHER:
             parts = dose.reshape(-1, _TOGETHER, dose.shape[1])
-            flow, dose, times = _joined(flow), parts.sum(axis=1), times[::_TOGETHER]
+            flow, dose, times = joined_flows(flow, _TOGETHER), parts.sum(axis=1), times[::_TOGETHER]
         flows.append(flow)
         doses.append(dose)
         cuts.append(times[1:])
@@ -172,11 +172,13 @@ def _counts(
     return count, each if each < _TOGETHER else -(-each // _TOGETHER) * _TOGETHER
 
 
-def _joined(flows: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Products of consecutive flows."""
-    parts = flows.reshape(-1, _TOGETHER, *flows.shape[1:])
+def joined_flows(flows: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Products of `count` consecutive flows, the last of them of as many as are left."""
+    padding, size = -len(flows) % count, flows.shape[1]
+    padded = np.concatenate((flows, np.broadcast_to(np.eye(size), (padding, size, size))))
+    parts = padded.reshape(-1, count, size, size)
     product = parts[:, 0]
-    for k in range(1, _TOGETHER):
+    for k in range(1, count):
         product = parts[:, k] @ product
     return product
 

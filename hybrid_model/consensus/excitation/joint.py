@@ -1,4 +1,4 @@
-"""Excitation of switching networks: jointly connected intervals, and the constants along each spanning tree.
+"""Excitation of switching networks: jointly connected intervals, and the constants that follow from them.
 
 The paper's corollary asks for contiguous intervals of bounded length over each of which the union of the graphs has a
 spanning tree. That does not suffice: the weights may fade from interval to interval. What suffices is a lower bound on
@@ -9,7 +9,7 @@ whole interval, and no tree has to come back (audit, section 8).
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import islice, pairwise
+from itertools import pairwise
 
 import networkx as nx
 import numpy as np
@@ -23,14 +23,12 @@ from hybrid_model.consensus.excitation.persistence import (
     window_extremes,
 )
 from hybrid_model.consensus.graphs.connectivity import is_connected
-from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import incidence
 from hybrid_model.consensus.scenario.definition import Scenario
 
-__all__ = ["JointExcitation", "JointInterval", "TreeExcitation", "joint_excitation", "tree_excitations"]
+__all__ = ["JointExcitation", "JointInterval", "joint_excitation"]
 
 _ZERO = 1e-12
-_MOST_TREES = 200
 
 
 @dataclass(frozen=True)
@@ -116,25 +114,6 @@ class JointExcitation:
         return min(interval.mu1 for interval in self.intervals)
 
 
-@dataclass(frozen=True)
-class TreeExcitation:
-    """Excitation along one spanning tree of the union graph, for kappa^m and kappa^M (paper, section 6).
-
-    Parameters
-    ----------
-    partition : TreePartition
-        The tree, in the underlying graph.
-    weights : WindowExtremes
-        Constants of W_tau, which the theorem names.
-    coordinates : WindowExtremes
-        Constants of M, for which its proof holds.
-    """
-
-    partition: TreePartition
-    weights: WindowExtremes
-    coordinates: WindowExtremes
-
-
 def joint_excitation(scenario: Scenario) -> JointExcitation:
     """Cut the time into the shortest jointly connected intervals, each ending at a switching instant.
 
@@ -189,51 +168,6 @@ def _to_the_end(scenario: Scenario, intervals: list[JointInterval]) -> JointInte
     """The last interval, made longer if windows behind its start would hold no whole interval."""
     last, longest, end = intervals[-1], max(interval.length for interval in intervals), scenario.stop_time
     return _interval(scenario, last.start, end) if end - last.start > 2 * longest else last
-
-
-def tree_excitations(
-    scenario: Scenario, window: float | None = None, most: int = _MOST_TREES
-) -> tuple[TreeExcitation, ...]:
-    """Constants along each spanning tree whose edges carry weight.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The network.
-    window : float, optional
-        T [s]; by default the period.
-    most : int
-        Trees beyond this number are left out; a complete graph on n agents has ``n**(n - 2)``.
-
-    Raises
-    ------
-    ValueError
-        As `excitation_constants`.
-    """
-    weights, network, horizon = scenario.edge_weights, scenario.network, excitation_horizon(scenario)
-    found = []
-    for tree in islice(_carrying_trees(scenario), most):
-        partition = TreePartition(network.agents, network.underlying_edges, tree)
-        extremes = [
-            window_extremes(signal_factor(scenario, signal, partition), weights, window, horizon)
-            for signal in (Signal.TREE_WEIGHTS, Signal.TREE_COORDINATES)
-        ]
-        found.append(TreeExcitation(partition, *extremes))
-    return tuple(found)
-
-
-def _carrying_trees(scenario: Scenario) -> Iterator[tuple[int, ...]]:
-    """Edge numbers of the spanning trees of the edges that carry weight within a period or the run."""
-    end = scenario.edge_weights.period or scenario.stop_time
-    doses = scenario.edge_weights.integral(0.0, end)
-    graph: nx.Graph[int] = nx.Graph()
-    graph.add_nodes_from(range(1, scenario.network.agents + 1))
-    for number, (edge, dose) in enumerate(zip(scenario.network.edges, doses, strict=True), start=1):
-        if dose > _ZERO * doses.max():
-            graph.add_edge(*edge, number=number, weight=float(number))
-    if nx.is_connected(graph):
-        for tree in nx.SpanningTreeIterator(graph):
-            yield tuple(sorted(number for _, _, number in tree.edges(data="number")))
 
 
 def _instants(scenario: Scenario) -> tuple[list[float], float | None]:

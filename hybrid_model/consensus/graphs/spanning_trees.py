@@ -173,7 +173,7 @@ class TreePartition:
 
     @cached_property
     def rho(self) -> float:
-        """``sqrt(1 + ||Z||^2)``, the tight factor in ``||x_e|| <= rho ||Upsilon||`` (audit, section 1)."""
+        """``sqrt(1 + ||Z||^2)``, the tight factor in ``||x_e|| <= rho ||Upsilon||`` (audit, section 4)."""
         return float(np.linalg.norm(self.R, 2))
 
 

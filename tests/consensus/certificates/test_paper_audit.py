@@ -11,6 +11,7 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates import counterexamples
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.forms import BOUNDS
 from hybrid_model.consensus.certificates.gaps import Gaps
 from hybrid_model.consensus.certificates.rates import corollary_rate
 from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
@@ -148,7 +149,7 @@ def shown(example, cases, numbers):
 
 def tables():
     """Rows of the page's tables as lists of cells, by the first cell of the header."""
-    found = {"row": [], "number": []}
+    found = {"row": [], "number": [], "quantity": []}
     kind = None
     for line in PAGE.read_text(encoding="utf-8").splitlines():
         cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else []
@@ -182,6 +183,11 @@ def test_every_number_of_the_page_is_what_the_code_gives(numbers):
 
 def test_the_page_has_the_verdicts_of_the_table():
     assert tables()["row"] == [[known.row, known.text, known.verdict.value] for known in STATEMENTS]
+
+
+def test_the_page_has_the_bounds_of_the_table():
+    rows = [[row.quantity, row.form, row.quantity.unit, row.source, ", ".join(row.needs)] for row in BOUNDS]
+    assert tables()["quantity"] == rows
 
 
 def test_false_is_what_a_counterexample_violates_and_nothing_else(cases, shown):

@@ -13,7 +13,8 @@ from hybrid_model.consensus.certificates.tree_bound import BoundForm
 from hybrid_model.consensus.exact.edge_domain import edge_domain_gains, edge_domain_system, impulse_modes
 from hybrid_model.consensus.exact.exponential_sums import absolute_integral, zeros
 from hybrid_model.consensus.exact.floquet import floquet_spectrum, transition_matrix
-from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain
+from hybrid_model.consensus.exact.l2_gain import periodic_l2_gain
+from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario

@@ -16,7 +16,8 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates.edge_comparison import compare_edge_domain
 from hybrid_model.consensus.certificates.tree_bound import BoundForm
 from hybrid_model.consensus.exact.edge_domain import edge_domain_gains
-from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains, periodic_l2_gain
+from hybrid_model.consensus.exact.l2_gain import periodic_l2_gain
+from hybrid_model.consensus.exact.periodic_edge_domain import period_map, periodic_gains
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.metrics import run_states
 from hybrid_model.consensus.runs.report import edge_norm

@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 from certificate_networks import WEIGHTS, drawn_scenario
+from certified import network
 from scipy.integrate import quad
 from scipy.linalg import expm
 
@@ -18,7 +19,6 @@ from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.certify import certify
 from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
-from hybrid_model.consensus.scenario.files import read_scenario
 
 # What a sum over cells of k int ||N|| <= 0.01 lacks, and the steps of the runs here, second order both.
 SHORT = 2e-4
@@ -129,17 +129,9 @@ def test_no_search_finds_errors_beyond_the_exact_radius(weights):
     assert min(near) > 1 - 5 * FOUND
 
 
-def small(agents, edges, weights, decay=0.0, gain=1.0, **more):
-    return read_scenario(
-        {
-            "name": "known",
-            "stop_time": 5.0,
-            "network": {"agents": agents, "edges": edges, "initial": [0.0] * agents, "gain": gain},
-            "weights": weights,
-            "trigger": {"kind": "dynamic", "threshold": 0.3, "decay": decay},
-            **more,
-        }
-    )
+def driven(edges, weights, decay=0.0, gain=1.0):
+    """A threshold of 0.3 that may decay."""
+    return network(edges, weights, trigger={"kind": "dynamic", "threshold": 0.3, "decay": decay}, gain=gain)
 
 
 TWO = {
@@ -157,16 +149,16 @@ class TestTwoAgents:
 
     @pytest.mark.parametrize("kind", TWO)
     def test_without_decay_it_is_twice_the_threshold(self, kind):
-        assert certify(small(2, [[1, 2]], TWO[kind])).value("radius", "exact") == pytest.approx(0.6, rel=1e-9)
+        assert certify(driven([[1, 2]], TWO[kind])).value("radius", "exact") == pytest.approx(0.6, rel=1e-9)
 
     @pytest.mark.parametrize("kind", TWO)
     def test_with_decay_by_quadrature(self, kind):
-        scenario = small(2, [[1, 2]], TWO[kind], gain=0.8)
+        scenario = driven([[1, 2]], TWO[kind], gain=0.8)
         period = scenario.edge_weights.period or 1.0
         mean = float(scenario.edge_weights.integral(0.0, period)[0]) / period
         rate = 2 * 0.8 * mean
         decay = 0.5 * rate
-        found = certify(small(2, [[1, 2]], TWO[kind], decay, gain=0.8)).value("radius", "exact")
+        found = certify(driven([[1, 2]], TWO[kind], decay, gain=0.8)).value("radius", "exact")
         weights = scenario.edge_weights
 
         def reached(t):
@@ -196,7 +188,7 @@ class TestCompleteGraphs:
     def test_constant(self, n, share):
         edges = [[i, j] for i in range(1, n + 1) for j in range(i + 1, n + 1)]
         rate = n * 0.5
-        scenario = small(n, edges, {"kind": "constant", "value": 0.5}, share * rate)
+        scenario = driven(edges, {"kind": "constant", "value": 0.5}, share * rate)
         box = math.sqrt(4 * (n // 2) * ((n + 1) // 2) / n)
         expected = 0.3 * math.sqrt(n) * box / (1 - share)
         # The cells follow the decay, too: second order in 0.01.
@@ -205,7 +197,7 @@ class TestCompleteGraphs:
 
 def test_a_path_of_three_by_its_modes():
     """Constant weights on a path: the support function from two exponentials, its maximum over a circle."""
-    scenario = small(3, [[1, 2], [2, 3]], {"kind": "constant", "value": 1.0})
+    scenario = driven([[1, 2], [2, 3]], {"kind": "constant", "value": 1.0})
     U = disagreement_basis(3)
     D = incidence(3, scenario.network.edges)
     N = U.T @ D @ D.T @ U

@@ -4,41 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from certified import CONSTANT, coarse, failed, network, run_of
 
-import hybrid_model as hm
+from hybrid_model.consensus.certificates.analysis import analyse
+from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.certify import certify
-from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.files import read_scenario
-from hybrid_model.native.compiled import compiled
 
-
-def network(edges, weights, *, trigger=None, agents=3, stop_time=5.0, **more):
-    return read_scenario(
-        {
-            "name": "reasons",
-            "stop_time": stop_time,
-            "network": {"agents": agents, "edges": edges, "initial": np.linspace(1.0, -1.0, agents).tolist()},
-            "weights": weights,
-            "trigger": trigger or {"kind": "static", "threshold": 0.3},
-            **more,
-        }
-    )
-
-
-def coarse(scenario, arc=None):
-    return certify(scenario, arc, resolution=0.05)
-
-
-def failed(found):
-    return {h.name: h.detail for h in found.hypotheses if not h.holds}
-
-
-def run_of(scenario):
-    return hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
-
-
-CONSTANT = {"kind": "constant", "value": 1.0}
-TWO_PAIRS = {"edges": [[1, 2], [3, 4]], "weights": CONSTANT, "agents": 4}
+TWO_PAIRS = {"edges": [[1, 2], [3, 4]], "weights": CONSTANT}
 
 
 class TestDisconnectedUnions:
@@ -149,15 +121,14 @@ class TestLongCycles:
     def test_the_floquet_rate_keeps_its_digits(self):
         """One edge: twice the mean weight. Two edges, slow weights: the mean of the least eigenvalue."""
         weights = {"kind": "sine", "mean": 1.0, "depth": 0.5, "rate": 0.02}
-        found = coarse(network([[1, 2]], weights, agents=2))
-        assert found.value("rate", "floquet") == pytest.approx(2.0, rel=1e-9)
-        found = coarse(network([[1, 2], [2, 3]], self.SLOW))
+        assert Bounds(analyse(network([[1, 2]], weights))).floquet_rate == pytest.approx(2.0, rel=1e-9)
+        bounds = Bounds(analyse(network([[1, 2], [2, 3]], self.SLOW)))
         t = np.linspace(0.0, 100 * math.pi, 4001)[:-1]
         first, second = (1 + 0.5 * np.sin(0.02 * t - phase) for phase in (0.0, 0.3))
         least = first + second - np.sqrt(first**2 + second**2 - first * second)
         # The eigenvectors turn slowly, at 0.02 rad/s against rates of order 1.
-        assert found.value("rate", "floquet") == pytest.approx(float(least.mean()), rel=2e-3)
-        assert found.value("transient", "floquet") >= 1.0
+        assert bounds.floquet_rate == pytest.approx(float(least.mean()), rel=2e-3)
+        assert bounds.floquet_overshoot >= 1.0
 
     def test_fewer_cells_are_said(self):
         found = certify(network([[1, 2], [2, 3]], {**self.SLOW, "rate": 0.001}))

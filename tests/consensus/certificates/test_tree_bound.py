@@ -1,53 +1,36 @@
-"""Rates and bounds: published values, the algebra of the audit, and runs that must stay below the valid bound."""
+"""Theorems 1 and 2 along a tree: published values, the algebra of the audit, runs below the valid bound, all trees."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from certified import network
 from oracles.exact_consensus import exact_run
 from scipy.integrate import quad
 
-from hybrid_model.consensus.certificates.rates import rate_of_contraction, tree_free_rate
-from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound, default_window
-from hybrid_model.consensus.excitation.persistence import Signal, scenario_excitation
+from hybrid_model.consensus.certificates.analysis import analyse
+from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.rates import corollary_rate, corollary_rate_exact, rate_of_contraction
+from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound, default_window, tree_radii
+from hybrid_model.consensus.exact.floquet import floquet_spectrum
+from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
-from hybrid_model.consensus.graphs.undirected import incidence
-from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.runs.report import edge_norm
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
 
-def constant_network(agents, edges, initial, value=1.0, *, gain=1.0, threshold=0.5, decay=0.0, **more):
-    return read_scenario(
-        {
-            "name": "constant",
-            "stop_time": 10.0,
-            "network": {"agents": agents, "edges": edges, "initial": initial, "gain": gain},
-            "weights": {"kind": "constant", "value": value},
-            "trigger": {"kind": "dynamic", "threshold": threshold, "decay": decay},
-            **more,
-        }
-    )
+def constant_network(agents, edges, initial, value=1.0, *, threshold=0.5, decay=0.0, **more):
+    weights, trigger = {"kind": "constant", "value": value}, {"kind": "dynamic", "threshold": threshold, "decay": decay}
+    return network(edges, weights, agents=agents, initial=initial, trigger=trigger, stop_time=10.0, **more)
 
 
 def with_decay(scenario, decay):
     return replace(scenario, trigger=Trigger(TriggerKind.DYNAMIC, scenario.trigger.threshold, decay))
 
 
-def edge_norm(scenario, x):
-    edges = scenario.network.underlying_edges
-    return float(np.linalg.norm(incidence(scenario.network.agents, edges).T @ x))
-
-
 class TestPublishedReferenceValuesOfScenarioA:
-    def test_rates(self):
-        scenario = load_scenario("paper-a-static")
-        printed, valid = (convergence_bound(scenario, form) for form in BoundForm)
-        assert printed.rate == pytest.approx(4.8108e-4, abs=5e-9)  # published with five digits
-        assert valid.rate == pytest.approx(1.2112e-4, abs=5e-9)
-        tree_free = tree_free_rate(scenario_excitation(scenario, Signal.DISAGREEMENT), scenario.network.gain)
-        assert tree_free == pytest.approx(9.5818e-3, abs=5e-8)
-
     def test_rho_error_bound_and_initial_norm(self):
         scenario = load_scenario("paper-a")
         bound = convergence_bound(scenario, BoundForm.VALID)
@@ -209,3 +192,39 @@ def test_a_graph_that_is_not_connected_is_refused():
 
 def test_rate_of_contraction():
     assert rate_of_contraction(1 - math.exp(-2 * 0.7 * 3), 3.0) == pytest.approx(0.7, rel=1e-12)
+
+
+class TestTreesAndCorollary:
+    def test_the_number_of_exciting_trees(self):
+        # The cycle on four agents has four spanning trees.
+        assert len(tree_radii(load_scenario("paper-a"), 2 * math.pi)) == 4
+
+    def test_every_tree_bounds_the_exact_radius(self):
+        analysis = analyse(load_scenario("paper-a-static"))
+        exact = Bounds(analysis).exact_radius
+        for form in BoundForm:
+            for found in tree_radii(analysis.scenario, analysis.window, form):
+                assert found.radius >= exact
+
+    @pytest.mark.parametrize("dwell", [math.pi / 2, math.pi, 2 * math.pi])
+    def test_repaired_corollary_on_the_example(self, dwell):
+        scenario = load_scenario("paper-a")
+        scenario = replace(scenario, switching=replace(scenario.switching, dwell=dwell))
+        joint = joint_excitation(scenario)
+        rates = [corollary_rate(joint, 1.0), corollary_rate_exact(joint, 1.0), floquet_spectrum(scenario).rate]
+        assert rates[0] > 0
+        assert rates == sorted(rates)
+
+    def test_repaired_corollary_on_random_switching(self):
+        random = np.random.default_rng(409)
+        for _ in range(40):
+            active = [(random.choice(6, int(random.integers(3, 5)), replace=False) + 1).tolist() for _ in range(3)]
+            scenario = network(
+                [[1, 2], [2, 3], [3, 4], [4, 1], [1, 3], [2, 4]],
+                {"kind": "constant", "value": random.uniform(0.2, 2, 6).tolist()},
+                switching={"dwell": 0.5, "active": [*active, [1, 2, 3]]},
+            )
+            joint = joint_excitation(scenario)
+            rates = [corollary_rate(joint, 1.0), corollary_rate_exact(joint, 1.0), floquet_spectrum(scenario).rate]
+            assert rates[0] > 0
+            assert rates == sorted(rates)

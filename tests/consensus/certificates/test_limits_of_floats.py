@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from certified import network, run_of
 from scipy.integrate import solve_ivp
 
-import hybrid_model as hm
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.certify import certify
@@ -18,29 +18,23 @@ from hybrid_model.consensus.exact.floquet import floquet_spectrum
 from hybrid_model.consensus.excitation.joint import joint_excitation
 from hybrid_model.consensus.excitation.persistence import Signal, signal_factor, window_extremes
 from hybrid_model.consensus.graphs.undirected import complete_edges, disagreement_basis, incidence
-from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.native.compiled import compiled
 
 PATH_RATE = 2 - math.sqrt(2)
 """Second smallest eigenvalue of the Laplacian of the path on four agents."""
 
 
-def network(edges, agents, weights, **further):
-    base = {
-        "name": "limits",
-        "stop_time": 30.0,
-        "network": {"agents": agents, "edges": edges, "initial": [float(i) for i in range(agents)]},
-        "weights": weights,
-        "trigger": {"kind": "static", "threshold": 0.1},
-    }
-    return read_scenario({**base, **further})
+def limit(edges, weights, **further):
+    """States one apart, a threshold of 0.1, half a minute."""
+    initial = [float(i) for i in range(max(map(max, edges)))]
+    base = {"trigger": {"kind": "static", "threshold": 0.1}, "initial": initial, "stop_time": 30.0}
+    return network(edges, weights, **base | further)
 
 
 def slow_path(rate, phase):
     weights = {"kind": "sine", "mean": 1.0, "depth": 0.5, "rate": rate, "phase": phase}
-    return network([[1, 2], [2, 3], [3, 4]], 4, weights)
+    return limit([[1, 2], [2, 3], [3, 4]], weights)
 
 
 def scaled_rate(scenario, segments, sweeps):
@@ -77,7 +71,7 @@ class TestLongPeriods:
         """Each direction is forgotten in one half of the period and kept in the other: multipliers exp(-2 h)."""
         switching = {"dwell": 10.0, "active": [[1, 2], [3, 4]]}
         edges = [[1, 2], [3, 4], [1, 3], [2, 4]]
-        spectrum = floquet_spectrum(network(edges, 4, {"kind": "constant", "value": 1.0}, switching=switching))
+        spectrum = floquet_spectrum(limit(edges, {"kind": "constant", "value": 1.0}, switching=switching))
         assert spectrum.is_scaled
         assert spectrum.rate == pytest.approx(1.0, rel=1e-9)  # e^{-20} lies 8 digits above rounding
 
@@ -85,7 +79,7 @@ class TestLongPeriods:
     def test_both_ways_meet(self, dwell):
         switching = {"dwell": dwell, "active": [[1, 2], [3, 4]]}
         edges = [[1, 2], [3, 4], [1, 3], [2, 4]]
-        spectrum = floquet_spectrum(network(edges, 4, {"kind": "constant", "value": 1.0}, switching=switching))
+        spectrum = floquet_spectrum(limit(edges, {"kind": "constant", "value": 1.0}, switching=switching))
         assert spectrum.rate == pytest.approx(1.0, rel=1e-12)
         expected = np.exp(-dwell * np.array([2.0, 2.0, 4.0]))
         np.testing.assert_allclose(np.abs(spectrum.multipliers), expected, atol=1e-14)
@@ -120,26 +114,26 @@ class TestBetaCloseToTheRate:
         assert "The energy bound does not exist: beta = 0.46" in notes
 
     def test_a_period_much_shorter_than_the_time_of_forgetting(self):
-        scenario = network(
-            [[1, 2], [2, 3]], 3, {"kind": "sine", "mean": 1.0, "depth": 0.5, "rate": 3e4, "phase": [0.0, 0.3]}
+        scenario = limit(
+            [[1, 2], [2, 3]], {"kind": "sine", "mean": 1.0, "depth": 0.5, "rate": 3e4, "phase": [0.0, 0.3]}
         )
         found = certify(scenario)
         # Weights that fast act by their mean: the rate and the radius of the path with weight 1.
-        mean = certify(network([[1, 2], [2, 3]], 3, {"kind": "constant", "value": 1.0}))
+        mean = certify(limit([[1, 2], [2, 3]], {"kind": "constant", "value": 1.0}))
         assert found.value("rate", "floquet") == pytest.approx(1.0, rel=1e-6)
         assert found.value("radius", "exact") == pytest.approx(mean.value("radius", "exact"), rel=2e-4)
         assert found.value("radius", "exact") < found.value("radius", "energy") < found.value("radius", "improved")
 
     def test_weights_that_differ_by_orders_of_magnitude(self):
         """Modes from 6e-4/s to 2e3/s; the number is of a sum over cells that grow with their age."""
-        scenario = network([[1, 2], [2, 3], [3, 4]], 4, {"kind": "constant", "value": [1e3, 1.0, 1e-3]})
+        scenario = limit([[1, 2], [2, 3], [3, 4]], {"kind": "constant", "value": [1e3, 1.0, 1e-3]})
         assert certify(scenario).value("radius", "exact") == pytest.approx(0.48967, abs=2e-5)
 
     def test_weights_that_are_nearly_always_off(self):
         """Switched on for a hundred-thousandth of the time: they act by their mean, only very slowly."""
         gated = {"kind": "gated-sine", "duty_percent": 0.001, "gate_rate": 4.0, "sine_rate": 1.0}
-        found = certify(network(LINE, 4, gated))
-        mean = certify(network(LINE, 4, {"kind": "constant", "value": found.value("rate", "floquet")}))
+        found = certify(limit(LINE, gated))
+        mean = certify(limit(LINE, {"kind": "constant", "value": found.value("rate", "floquet")}))
         slowest = mean.value("rate", "floquet") / found.value("rate", "floquet")
         assert slowest == pytest.approx(PATH_RATE, rel=1e-6)
         assert found.value("radius", "exact") == pytest.approx(mean.value("radius", "exact"), rel=2e-4)
@@ -158,24 +152,22 @@ class TestWhatRemains:
         [({"kind": "sampled", "threshold": 0.1, "period": 0.9}, 0.9), ({"kind": "periodic", "period": 0.2}, 0.2)],
     )
     def test_broadcasts_at_known_times_are_a_period_apart(self, trigger, gap):
-        scenario = network(LINE, 4, SINES, trigger=trigger)
-        arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
-        found = certify(scenario, arc, resolution=0.1)
+        scenario = limit(LINE, SINES, trigger=trigger)
+        found = certify(scenario, run_of(scenario), resolution=0.1)
         assert found.value("radius", "exact") is None
         assert found.value("min_gap", "improved") == gap <= found.value("min_gap", "observed")
         assert "and the period, as a gap, are certified" in " ".join(found.notes)
 
     def test_without_trigger_errors_nothing_is_left(self):
-        scenario = network(LINE, 4, SINES, trigger={"kind": "continuous"})
-        arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
-        found = certify(scenario, arc, resolution=0.1)
+        scenario = limit(LINE, SINES, trigger={"kind": "continuous"})
+        found = certify(scenario, run_of(scenario), resolution=0.1)
         assert found.value("radius", "observed") == found.value("radius", "exact") == 0.0
 
     def test_a_share_of_the_threshold_that_falls_fast_costs_no_gap(self):
         """Without a period: a mixed threshold whose decay is far above every rate still has the gap of its offset."""
         switching = {"kind": "random-dwell", "active": [[1, 2], [2, 3]], "shortest": 0.3, "longest": 0.9, "seed": 4}
         trigger = {"kind": "mixed", "offset": 0.1, "threshold": 0.2, "decay": 3.0}
-        scenario = network(LINE, 4, {"kind": "constant", "value": 1.0}, trigger=trigger, switching=switching)
+        scenario = limit(LINE, {"kind": "constant", "value": 1.0}, trigger=trigger, switching=switching)
         found = certify(scenario, window=2.0, resolution=0.1)
         static = certify(replace(scenario, trigger=Trigger(TriggerKind.STATIC, 0.1)), window=2.0, resolution=0.1)
         assert 0 < found.value("min_gap", "valid") <= found.value("min_gap", "improved")
@@ -184,7 +176,7 @@ class TestWhatRemains:
     def test_an_edge_that_is_switched_off_for_ever(self):
         """The only jointly connected interval then lasts until the end: no window behind it holds another one."""
         switching = {"kind": "sequence", "dwell": [2.0, 28.0], "active": [[1, 2], [1]]}
-        scenario = network([[1, 2], [2, 3]], 3, {"kind": "constant", "value": 1.0}, switching=switching)
+        scenario = limit([[1, 2], [2, 3]], {"kind": "constant", "value": 1.0}, switching=switching)
         joint = joint_excitation(scenario)
         assert [(interval.start, interval.end) for interval in joint.intervals] == [(0.0, 30.0)]
         assert 0 < joint.mu1_of_paths <= joint.mu1_of_trees <= joint.mu1_of_intervals <= joint.exact.mu1 * (1 + 1e-12)
@@ -203,7 +195,7 @@ def test_constants_of_many_square_waves_against_all_windows():
     edges = complete_edges(5)
     rates = [1.0 + 0.137 * math.sqrt(number + 2) for number in range(len(edges))]
     weights = {"kind": "square", "high": 1.0, "low": 0.1, "gate_rate": rates, "duty_percent": 30.0}
-    scenario = network([list(edge) for edge in edges], 5, weights)
+    scenario = limit([list(edge) for edge in edges], weights)
     factor, wanted = signal_factor(scenario, Signal.DISAGREEMENT), scenario.edge_weights
     assert wanted.period is None
     found = window_extremes(factor, wanted, 4.0, 30.0)
