@@ -40,7 +40,8 @@ from hybrid_model.consensus.laws.double_integrators import (
 from hybrid_model.consensus.laws.threshold_triggers import DynamicTrigger, EventGenerator, MixedTrigger, StaticTrigger
 from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop, vector_wires
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.runs.metrics import communication, gap_statistics, performance, run_metrics
+from hybrid_model.consensus.runs.communication import communication, gap_statistics
+from hybrid_model.consensus.runs.metrics import performance, run_metrics
 from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
 from hybrid_model.consensus.runs.savings import Savings, run_savings
 from hybrid_model.consensus.scenario.channel import Channel

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from hybrid_model.consensus.certificates.components import connected_components
+from hybrid_model.consensus.certificates.components import connected_components, union_time
 from hybrid_model.consensus.graphs.generators import (
     complete_graph,
     erdos_renyi_graph,
@@ -31,8 +31,7 @@ def drawn_scenario(random, most_agents, *, weights=None, switching=None, stop_ti
     """A network whose edges join all agents over its cycle; kinds are drawn unless given."""
     while True:
         scenario = read_scenario(drawn_entries(random, most_agents, weights, switching, stop_time))
-        period = scenario.edge_weights.period
-        if len(connected_components(scenario, stop_time if period is None else period or 1.0)) == 1:
+        if len(connected_components(scenario, union_time(scenario))) == 1:
             return scenario
 
 

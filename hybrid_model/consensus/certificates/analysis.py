@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from hybrid_model.consensus.certificates.components import active_edges, connected_components
+from hybrid_model.consensus.certificates.components import active_edges, connected_components, union_time
 from hybrid_model.consensus.certificates.rates import tree_free_contraction
 from hybrid_model.consensus.certificates.tree_bound import default_window
 from hybrid_model.consensus.certificates.windows import RateForm, best_window
@@ -211,8 +211,8 @@ def analyse(
     """
     network = scenario.network
     period = scenario.edge_weights.period
-    cycle = scenario.stop_time if period is None else period or 1.0
     if tree is None:
+        cycle = union_time(scenario)
         parts = connected_components(scenario, cycle)
         if len(parts) > 1:
             raise ValueError(f"the edges that carry weight join only the agents {parts} among each other, not all.")

@@ -9,7 +9,7 @@ from typing import Any
 from hybrid_model import HybridArc, Stop
 from hybrid_model.consensus.certificates.analysis import analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
-from hybrid_model.consensus.certificates.components import component_scenarios, connected_components
+from hybrid_model.consensus.certificates.components import component_scenarios, connected_components, union_time
 from hybrid_model.consensus.certificates.forms import BOUNDS, Certified, Form, Quantity, certified_values
 from hybrid_model.consensus.certificates.hypotheses import (
     CheckedHypothesis,
@@ -92,8 +92,7 @@ def certify(
     resolution : float
         Of the exact worst case, see `hybrid_model.consensus.exact.worst_case.ReachableSets`.
     """
-    period = scenario.edge_weights.period
-    cycle = scenario.stop_time if period is None else period or 1.0
+    cycle = union_time(scenario)
     general = network_hypotheses(scenario, cycle)
     if len(connected_components(scenario, cycle)) > 1:
         return _in_components(scenario, arc, general, cycle, resolution)

@@ -12,10 +12,16 @@ import numpy as np
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
 from hybrid_model.consensus.switching.base import NoSwitching
 
-__all__ = ["active_edges", "component_scenarios", "connected_components", "joined_agents", "listed"]
+__all__ = ["active_edges", "component_scenarios", "connected_components", "joined_agents", "listed", "union_time"]
 
 _SPREAD = 1e-12
 """Share of the largest integral below which an edge's integral counts as zero (rounding)."""
+
+
+def union_time(scenario: Scenario) -> float:
+    """Length [s] of the time from t = 0 over which the union of the graphs is taken: the period, or the run."""
+    period = scenario.edge_weights.period
+    return scenario.stop_time if period is None else period or 1.0
 
 
 def active_edges(scenario: Scenario, cycle: float) -> list[int]:

@@ -18,7 +18,8 @@ from matplotlib.ticker import MaxNLocator
 from hybrid_model.consensus.figures.run import plot_broadcasts, plot_error_against_threshold
 from hybrid_model.consensus.figures.style import COLUMN, DASHES, MARKER, VIOLATED, legend_above, over_time
 from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of
-from hybrid_model.consensus.runs.metrics import States, disagreement, gap_statistics
+from hybrid_model.consensus.runs.communication import gap_statistics
+from hybrid_model.consensus.runs.metrics import States, disagreement
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.plots import COLORS, new_axes, plot_inter_event_times
 from hybrid_model.record.arc import HybridArc

@@ -10,14 +10,8 @@ from scipy.integrate import quad
 
 import hybrid_model as hm
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.runs.metrics import (
-    communication,
-    gap_statistics,
-    performance,
-    run_metrics,
-    run_states,
-    settling_time,
-)
+from hybrid_model.consensus.runs.communication import communication, gap_statistics
+from hybrid_model.consensus.runs.metrics import performance, run_metrics, run_states, settling_time
 from hybrid_model.consensus.runs.periodic_run import periodic_run, slow_gain
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.runs.savings import Measure, run_savings

@@ -2,13 +2,9 @@
 
 from dataclasses import replace
 
-import matplotlib
-
-matplotlib.use("agg")
-
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from drawn_axes import labels, line
 
 import hybrid_model as hm
 from hybrid_model.consensus.certificates.tree_bound import BoundForm, convergence_bound
@@ -19,12 +15,11 @@ from hybrid_model.consensus.figures.run import (
     plot_states,
     save_paper_figures,
 )
-from hybrid_model.consensus.figures.style import COLUMN
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.definition import replace_trigger
 from hybrid_model.consensus.scenario.files import load_scenario
-from hybrid_model.plots import JOURNAL
+from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
 # In 1/s: no state is faster, for two neighbours, weights up to 4 and differences of states up to 1.7. A broadcast is
 # late by at most the run's location tolerance, so the error exceeds the threshold by at most this times that.
@@ -35,23 +30,6 @@ SPEED = 14.0
 def run(request):
     scenario = replace(replace_trigger(load_scenario("paper-a"), request.param), stop_time=10.0)
     return scenario, hm.simulate(closed_loop(scenario), scenario.stop_time)
-
-
-@pytest.fixture
-def ax():
-    with plt.rc_context(JOURNAL):
-        figure, axes = plt.subplots(figsize=COLUMN)
-        yield axes
-        plt.close(figure)
-
-
-def drawn(ax, label):
-    """Times and values of the line or the dots that the legend calls `label`."""
-    return next(line for line in ax.lines if line.get_label() == label).get_data()
-
-
-def labels(ax):
-    return [text.get_text() for text in ax.get_legend().get_texts()]
 
 
 def draw_all(scenario, arc):
@@ -83,7 +61,7 @@ def test_figure_can_be_read(run, ax, name):
 def test_states_start_at_the_initial_values_and_carry_one_dot_a_broadcast(run, ax):
     scenario, arc = run
     plot_states(scenario, arc, ax)
-    starts = [drawn(ax, f"$x_{{{i}}}$")[1][0] for i in (1, 2, 3, 4)]
+    starts = [line(ax, f"$x_{{{i}}}$").get_data()[1][0] for i in (1, 2, 3, 4)]
     assert starts == list(scenario.network.initial)
     dots = [line for line in ax.lines if line.get_marker() == "o"]
     assert sum(len(line.get_xdata()) for line in dots) == sum(run_report(scenario, arc).events_per_agent)
@@ -113,11 +91,11 @@ def test_many_agents_have_no_legend_of_colours_that_repeat(ax):
 def test_error_stays_below_the_threshold_and_reaches_it_at_each_broadcast(run, ax):
     scenario, arc = run
     plot_error_against_threshold(scenario, arc, 2, ax)
-    times, error = drawn(ax, r"$|\hat{x}_{2} - x_{2}|$")
+    times, error = line(ax, r"$|\hat{x}_{2} - x_{2}|$").get_data()
     c, beta = scenario.trigger.threshold, scenario.trigger.decay
     tolerance = SPEED * arc.event_tolerance
     assert np.max(error - c * np.exp(-beta * times)) <= tolerance
-    events, reached = drawn(ax, "broadcast")
+    events, reached = line(ax, "broadcast").get_data()
     np.testing.assert_array_equal(events, run_report(scenario, arc).event_times[1])
     assert len(events) > 0
     np.testing.assert_allclose(reached, c * np.exp(-beta * events), rtol=0, atol=tolerance)
@@ -149,10 +127,10 @@ def test_edge_norm_is_below_the_valid_bound_and_missing_bounds_are_named(run, ax
     scenario, arc = run
     bounds = [convergence_bound(scenario, form) for form in BoundForm]
     plot_edge_norm(scenario, arc, bounds, ax)
-    times, norm = drawn(ax, r"$\|x_e(t)\|$")
+    times, norm = line(ax, r"$\|x_e(t)\|$").get_data()
     # Published reference value of scenario A: six edges of the complete graph.
     assert norm[0] == pytest.approx(2.703701, abs=1e-6)
-    assert np.all(norm <= np.interp(times, *drawn(ax, "valid bound")))
+    assert np.all(norm <= np.interp(times, *line(ax, "valid bound").get_data()))
     # The printed bound needs beta < alpha_v, which the dynamic trigger of the paper does not meet.
     missing = scenario.trigger.decay > 0
     assert ("no printed bound" in labels(ax)) is missing
@@ -165,3 +143,10 @@ def test_paper_figures_are_the_same_bytes_each_time(run, tmp_path):
     names = ["kind_states.png", "kind_states.pdf", "kind_edge_norm.png", "kind_edge_norm.pdf"]
     assert [path.name for path in first] == names
     assert [path.read_bytes() for path in first] == [path.read_bytes() for path in second]
+
+
+def test_the_threshold_is_written_as_the_trigger_has_it(run, ax):
+    scenario, arc = run
+    mixed = Trigger(TriggerKind.MIXED, threshold=0.4, decay=0.2, offset=0.1)
+    plot_error_against_threshold(replace(scenario, trigger=mixed), arc, 2, ax)
+    assert r"threshold $c_0 + c_1\,e^{-\beta t}$" in labels(ax)
