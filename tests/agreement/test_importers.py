@@ -7,6 +7,7 @@ import fmpy
 import numpy as np
 import pytest
 from catalogue import cases
+from executions import reference
 
 import hybrid_model as hm
 from hybrid_model.models import BouncingBall
@@ -59,12 +60,7 @@ def test_agent_with_changing_inputs_in_fmpy(use, exported):
         start.update({name: steps[t] for name, steps in changes.items() if t in steps})
         rows.append((t, *start.values()))
     signals = np.array(rows, dtype=[("time", float), *((name, float) for name in start)])
-    inputs = {
-        "neighbours": hm.Signal(
-            lambda t: [signals[name][np.searchsorted(times, t, side="right") - 1] for name in start], times[1:-1]
-        )
-    }
-    arc = hm.simulate(case.automaton, case.t_end, inputs=inputs)
+    arc = reference("agent2_dynamic")
     result = fmpy.simulate_fmu(
         str(exported(case.automaton, "agent2_dynamic")),
         stop_time=case.t_end,
