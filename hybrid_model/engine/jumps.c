@@ -30,7 +30,9 @@ static bool refused(Engine *engine, Ending ending, size_t jump, size_t i, double
                        starts ? "" : NAME_AT(m->names, m->jumps[jump].name), starts ? "" : "'", rule);
 }
 
-bool engine_accept_state(Engine *engine, size_t jump, const Point *point)
+/* Copies the new state in engine->reset into the point if all of it is finite, and whole where it must be; it comes
+   from a jump, or (n_jumps) from the start map. */
+static bool accept_state(Engine *engine, size_t jump, const Point *point)
 {
     const Model *m = engine->model;
     for (size_t i = 0; i < m->n_states + m->n_discrete; i++)
@@ -47,15 +49,17 @@ bool engine_accept_state(Engine *engine, size_t jump, const Point *point)
     return true;
 }
 
+bool engine_apply_start(Engine *engine, const Point *point)
+{
+    const Model *m = engine->model;
+    if (!engine_evaluate(engine, m->start, *point->time, point->x, point->z, engine->reset.x, engine->reset.z))
+        return engine_fail(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.", m->name);
+    return accept_state(engine, m->n_jumps, point);
+}
+
 static bool evaluate_reset(Engine *engine, size_t jump, const Point *point)
 {
-    engine->arg[0] = point->time;
-    engine->arg[1] = point->x;
-    engine->arg[2] = point->z;
-    engine->arg[3] = engine->u;
-    engine->arg[4] = engine->p;
-    engine->res[0] = engine->reset.x;
-    engine->res[1] = engine->reset.z;
+    engine_bind(engine, point->time, point->x, point->z, engine->reset.x, engine->reset.z);
     return engine->model->reset(jump, engine->arg, engine->res, engine->iw, engine->w) == 0;
 }
 
@@ -96,8 +100,7 @@ bool engine_apply_reset(Engine *engine, size_t jump, const Point *point)
     if (!evaluate_reset(engine, jump, point))
         return engine_fail(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
                            NAME_AT(engine->model->names, entry->name), *point->time);
-    return engine_accept_state(engine, jump, point) &&
-           (entry->kind == JUMP_ON_STATE || moved_on(engine, jump, was, point));
+    return accept_state(engine, jump, point) && (entry->kind == JUMP_ON_STATE || moved_on(engine, jump, was, point));
 }
 
 /* The first breakpoint of the flow that is due, n_jumps if there is none. */
@@ -205,12 +208,7 @@ static bool take_jump(Engine *engine, size_t jump)
 bool engine_start(Engine *engine)
 {
     engine_changed(engine);
-    if (!engine_evaluate(engine, engine->model->start, *engine->live.time, engine->live.x, engine->live.z,
-                         engine->reset.x, engine->reset.z))
-        return engine_fail(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.",
-                           engine->model->name);
-    return engine_accept_state(engine, engine->model->n_jumps, &engine->live) &&
-           engine_take_internal_jumps(engine, &engine->live);
+    return engine_apply_start(engine, &engine->live) && engine_take_internal_jumps(engine, &engine->live);
 }
 
 size_t engine_pending(Engine *engine)

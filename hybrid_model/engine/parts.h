@@ -154,6 +154,8 @@ void engine_copy_point(const Engine *engine, const Point *from, const Point *to)
 size_t engine_seed_count(const Model *model);
 
 /* values.c */
+/* Hands a function of the model its arguments and places for its results. */
+void engine_bind(Engine *engine, const double *t, const double *x, const double *z, double *first, double *second);
 /* Evaluates a function of the model at (t, x, z) with the present inputs and parameters. */
 bool engine_evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
               double *second);
@@ -217,9 +219,8 @@ bool engine_zeno_record(Engine *engine, size_t jump);
 bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t);
 
 /* jumps.c */
-/* Copies the new state in engine->reset into the point if all of it is finite, and whole where it must be; it comes
-   from a jump, or (n_jumps) from the start map. */
-bool engine_accept_state(Engine *engine, size_t jump, const Point *point);
+/* Applies the start map to the point. */
+bool engine_apply_start(Engine *engine, const Point *point);
 /* Takes a jump that is due at the point, for which the event times must be there; those afterwards are there then. */
 bool engine_apply_reset(Engine *engine, size_t jump, const Point *point);
 bool engine_evaluate_times(Engine *engine, const Point *point);

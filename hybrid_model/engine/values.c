@@ -36,17 +36,22 @@ void engine_clear_levels(const Engine *engine, const Point *point)
         point->level[i] = 0.0;
 }
 
-bool engine_evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
-                     double *second)
+void engine_bind(Engine *engine, const double *t, const double *x, const double *z, double *first, double *second)
 {
     /* The function may use the places behind its own for the functions that it calls. */
-    engine->arg[0] = &t;
+    engine->arg[0] = t;
     engine->arg[1] = x;
     engine->arg[2] = z;
     engine->arg[3] = engine->u;
     engine->arg[4] = engine->p;
     engine->res[0] = first;
     engine->res[1] = second;
+}
+
+bool engine_evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
+                     double *second)
+{
+    engine_bind(engine, &t, x, z, first, second);
     return function(engine->arg, engine->res, engine->iw, engine->w, 0) == 0;
 }
 

@@ -8,13 +8,8 @@ static bool show(Engine *engine, View view)
     const Point *shown = &engine->shown;
     size_t jump;
     engine_copy_point(engine, &engine->live, shown);
-    if (view == VIEW_START) {
-        if (!engine_evaluate(engine, engine->model->start, *shown->time, shown->x, shown->z, engine->reset.x,
-                             engine->reset.z))
-            return engine_fail(engine, ENDED_FAILED, "The start values of '%s' could not be evaluated.",
-                               engine->model->name);
-        return engine_accept_state(engine, engine->model->n_jumps, shown);
-    }
+    if (view == VIEW_START)
+        return engine_apply_start(engine, shown);
     if (view == VIEW_PENDING && engine->status->ending == ENDED_NOT) {
         if (!engine_take_internal_jumps(engine, shown) || !engine_first_enabled(engine, shown, &jump))
             return false;

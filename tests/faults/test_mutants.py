@@ -62,7 +62,7 @@ def test_its_place_is_there(mutant):
 
 def test_blanks_and_comments_do_not_count_and_other_functions_do_not_either():
     start = next(mutant for mutant in MUTANTS if mutant.name == "start values as declared")
-    spread = replace(start, old="  if(view  ==\n\n VIEW_START){")
+    spread = replace(start, old="  if(view  ==\n\n VIEW_START)")
     assert spread.changed() == start.changed()
     for lost in (replace(start, at="engine_reverse"), replace(start, at="nowhere"), replace(start, old="view")):
         with pytest.raises(AssertionError, match="there must be one"):
