@@ -81,9 +81,25 @@ class Evidence:
         return Gaps(self.bounds)
 
     @property
-    def is_papers(self) -> bool:
-        """Whether the printed statements are about this scenario."""
-        return follows_paper(self.bounds.analysis.scenario)
+    def valid_transient(self) -> float | None:
+        """``m_v``."""
+        return self.bounds.valid.overshoot if self.bounds.valid.rate else None
+
+    @property
+    def improved_transient(self) -> float | None:
+        """``exp(rate T)``, since the norm of xi never grows."""
+        rate = self.bounds.improved_rate
+        return math.exp(rate * self.bounds.analysis.window) if rate else None
+
+    @property
+    def printed_radius(self) -> float | None:
+        """The printed radius of a scenario that the printed statements are about."""
+        return self.bounds.printed_radius if follows_paper(self.bounds.analysis.scenario) else None
+
+    @property
+    def printed_gap(self) -> float | None:
+        """The printed gap of such a scenario."""
+        return self.gaps.printed if follows_paper(self.bounds.analysis.scenario) else None
 
 
 @dataclass(frozen=True)
@@ -100,10 +116,8 @@ class Bound:
         Without which there is no value.
     value : callable
         The value from the `Evidence`; None if a hypothesis fails.
-    instead : Hypothesis or None
-        What takes the place of "beta below the Floquet rate" for weights without a period.
-    in_json : bool
-        Whether the object of ``certify --json`` has it.
+    without_period : tuple of Hypothesis, optional
+        What takes the place of `needs` for weights without a period.
     """
 
     quantity: Quantity
@@ -111,15 +125,15 @@ class Bound:
     source: str
     needs: tuple[Hypothesis, ...]
     value: Callable[[Evidence], float | None]
-    instead: Hypothesis | None = None
-    in_json: bool = True
+    without_period: tuple[Hypothesis, ...] | None = None
 
-    def needed(self, *, is_periodic: bool) -> tuple[Hypothesis, ...]:
-        """The hypotheses that this bound needs, for weights with or without a period."""
-        if is_periodic:
-            return self.needs
-        kept = tuple(each for each in self.needs if each is not Hypothesis.BETA_BELOW_FLOQUET)
-        return kept if self.instead is None else (*kept, self.instead)
+    @property
+    def in_json(self) -> bool:
+        """Whether the object of ``certify --json`` has it."""
+        return self.quantity is not Quantity.TRANSIENT and (self.quantity, self.form) != (
+            Quantity.RADIUS,
+            Form.IMPROVED,
+        )
 
 
 @dataclass(frozen=True)
@@ -162,7 +176,7 @@ def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certifie
             row.value(evidence),
             row.quantity.unit + (factor if row.quantity is Quantity.RADIUS else ""),
             row.source,
-            row.needed(is_periodic=bounds.analysis.is_periodic),
+            row.needs if bounds.analysis.is_periodic or row.without_period is None else row.without_period,
         )
         for row in BOUNDS
     )
@@ -173,118 +187,44 @@ def _printed(place: str, row: str) -> str:
     return f"paper, {place} ({statement(row).remark})"
 
 
-def _improved_transient(evidence: Evidence) -> float | None:
-    rate = evidence.bounds.improved_rate
-    return math.exp(rate * evidence.bounds.analysis.window) if rate else None
-
-
-_RATE, _TRANSIENT, _RADIUS, _MIN_GAP = Quantity
 _EXCITED = (Hypothesis.CONNECTED_UNION, Hypothesis.PERSISTENT_EXCITATION)
 _PERIODIC = (Hypothesis.CONNECTED_UNION, Hypothesis.PERIODIC_WEIGHTS)
 _ERRORS = (Hypothesis.CONNECTED_UNION, Hypothesis.BOUNDED_ERRORS)
-_BELOW_FLOQUET = (*_ERRORS, Hypothesis.BETA_BELOW_FLOQUET)
-_PAPERS = (
-    Hypothesis.EXCITING_TREE,
-    Hypothesis.PAPER_TRIGGER,
-    Hypothesis.IDEAL_CHANNEL,
-    Hypothesis.BETA_BELOW_PRINTED,
-)
+_VALID = (*_ERRORS, Hypothesis.BETA_BELOW_VALID)
+_IMPROVED = (*_ERRORS, Hypothesis.BETA_BELOW_IMPROVED)
+_FLOQUET = (*_ERRORS, Hypothesis.BETA_BELOW_FLOQUET)
+_TREE = (Hypothesis.EXCITING_TREE,)
+_PAPERS = (*_TREE, Hypothesis.PAPER_TRIGGER, Hypothesis.IDEAL_CHANNEL, Hypothesis.BETA_BELOW_PRINTED)
+_RATE, _TRANSIENT, _RADIUS, _GAP = Quantity
+_GAP_SOURCE = "audit, section 6, logarithmic, per edge, excitation-aware"
 
 BOUNDS = (
+    Bound(_RATE, Form.PRINTED, _printed("theorem 1", "b"), _TREE, lambda e: e.bounds.printed.rate or None),
+    Bound(_RATE, Form.VALID, "audit, section 3 (i)", _EXCITED, lambda e: e.bounds.valid.rate or None),
+    Bound(_RATE, Form.IMPROVED, "audit, section 3 (ii)", _EXCITED, lambda e: e.bounds.improved_rate or None),
+    Bound(_RATE, Form.FLOQUET, "audit, section 7", _PERIODIC, lambda e: e.bounds.floquet_rate),
+    Bound(_TRANSIENT, Form.PRINTED, _printed("eq:stm inequality", "b'"), (), lambda _: None),
+    Bound(_TRANSIENT, Form.VALID, "audit, section 3, m_v", _EXCITED, lambda e: e.valid_transient),
     Bound(
-        _RATE,
-        Form.PRINTED,
-        _printed("theorem 1", "b"),
-        (Hypothesis.EXCITING_TREE,),
-        lambda known: known.bounds.printed.rate or None,
+        _TRANSIENT, Form.IMPROVED, "audit, section 3, in the coordinates xi", _EXCITED, lambda e: e.improved_transient
     ),
-    Bound(_RATE, Form.VALID, "audit, section 3 (i)", _EXCITED, lambda known: known.bounds.valid.rate or None),
-    Bound(_RATE, Form.IMPROVED, "audit, section 3 (ii)", _EXCITED, lambda known: known.bounds.improved_rate or None),
-    Bound(_RATE, Form.FLOQUET, "audit, section 7", _PERIODIC, lambda known: known.bounds.floquet_rate),
-    Bound(_TRANSIENT, Form.PRINTED, _printed("eq:stm inequality", "b'"), (), lambda _: None, in_json=False),
-    Bound(
-        _TRANSIENT,
-        Form.VALID,
-        "audit, section 3, m_v",
-        _EXCITED,
-        lambda known: known.bounds.valid.overshoot if known.bounds.valid.rate else None,
-        in_json=False,
-    ),
-    Bound(
-        _TRANSIENT,
-        Form.IMPROVED,
-        "audit, section 3, in the coordinates xi",
-        _EXCITED,
-        _improved_transient,
-        in_json=False,
-    ),
-    Bound(
-        _TRANSIENT,
-        Form.FLOQUET,
-        "audit, section 7",
-        _PERIODIC,
-        lambda known: known.bounds.floquet_overshoot,
-        in_json=False,
-    ),
-    Bound(
-        _RADIUS,
-        Form.PRINTED,
-        _printed("theorem 2, rho kappa_2", "l"),
-        _PAPERS,
-        lambda known: known.bounds.printed_radius if known.is_papers else None,
-    ),
-    Bound(
-        _RADIUS,
-        Form.VALID,
-        "audit, section 5.2",
-        (*_ERRORS, Hypothesis.BETA_BELOW_VALID),
-        lambda known: known.bounds.valid_radius,
-    ),
-    Bound(
-        _RADIUS,
-        Form.IMPROVED,
-        "audit, end of section 5.2",
-        (*_ERRORS, Hypothesis.BETA_BELOW_IMPROVED),
-        lambda known: known.bounds.improved_radius,
-        in_json=False,
-    ),
-    Bound(
-        _RADIUS,
-        Form.ENERGY,
-        "audit, section 5.3",
-        _BELOW_FLOQUET,
-        lambda known: known.bounds.energy_radius,
-        instead=Hypothesis.BETA_BELOW_IMPROVED,
-    ),
+    Bound(_TRANSIENT, Form.FLOQUET, "audit, section 7", _PERIODIC, lambda e: e.bounds.floquet_overshoot),
+    Bound(_RADIUS, Form.PRINTED, _printed("theorem 2, rho kappa_2", "l"), _PAPERS, lambda e: e.printed_radius),
+    Bound(_RADIUS, Form.VALID, "audit, section 5.2", _VALID, lambda e: e.bounds.valid_radius),
+    Bound(_RADIUS, Form.IMPROVED, "audit, end of section 5.2", _IMPROVED, lambda e: e.bounds.improved_radius),
+    Bound(_RADIUS, Form.ENERGY, "audit, section 5.3", _FLOQUET, lambda e: e.bounds.energy_radius, _IMPROVED),
     Bound(
         _RADIUS,
         Form.EXACT,
         "audit, section 7; reached from below, see the notes",
-        _BELOW_FLOQUET,
-        lambda known: known.bounds.exact_radius,
+        _FLOQUET,
+        lambda e: e.bounds.exact_radius,
+        _ERRORS,
     ),
-    Bound(_RADIUS, Form.OBSERVED, "run", (), lambda known: known.seen.radius if known.seen else None),
-    Bound(
-        _MIN_GAP,
-        Form.PRINTED,
-        _printed("eq:zeno dynamic upper bound", "e3"),
-        _PAPERS,
-        lambda known: known.gaps.printed if known.is_papers else None,
-    ),
-    Bound(
-        _MIN_GAP,
-        Form.VALID,
-        "audit, section 6, Lambert form",
-        (*_ERRORS, Hypothesis.BETA_BELOW_VALID),
-        lambda known: known.gaps.valid,
-    ),
-    Bound(
-        _MIN_GAP,
-        Form.IMPROVED,
-        "audit, section 6, logarithmic, per edge, excitation-aware",
-        _BELOW_FLOQUET,
-        lambda known: known.gaps.improved,
-    ),
-    Bound(_MIN_GAP, Form.OBSERVED, "run", (), lambda known: known.seen.min_gap if known.seen else None),
+    Bound(_RADIUS, Form.OBSERVED, "run", (), lambda e: e.seen.radius if e.seen else None),
+    Bound(_GAP, Form.PRINTED, _printed("eq:zeno dynamic upper bound", "e3"), _PAPERS, lambda e: e.printed_gap),
+    Bound(_GAP, Form.VALID, "audit, section 6, Lambert form", _VALID, lambda e: e.gaps.valid),
+    Bound(_GAP, Form.IMPROVED, _GAP_SOURCE, _FLOQUET, lambda e: e.gaps.improved, _ERRORS),
+    Bound(_GAP, Form.OBSERVED, "run", (), lambda e: e.seen.min_gap if e.seen else None),
 )
 """Every quantity in all its forms, the printed one first."""
