@@ -43,6 +43,10 @@ FIRST_LEAST = 64.0
 """In ulp: the shortest first step."""
 PROBE = 1e-6
 """Where a flow leads from a border is looked at after this part of a step of the solver."""
+PROBE_PARTS = tuple(10.0 ** (-3 * k) for k in range(12, -1, -1))
+"""And after these parts of that, the shortest first, while no state has shown its size: the step may be too long."""
+STEADY = 0.25
+"""What changes twice as much in twice the time, but for this part, is no rounding: it shows where a flow leads."""
 OVERSHOOT = 1000.0
 """In ulp: so far before a guard a solver may get stuck if the flow map cannot be evaluated behind it."""
 JUMPS_AT_ONCE = 1000
@@ -64,6 +68,7 @@ PAUSE = 1e-4
 
 _IN_MODELS = (
     *("roundings", "instant", "instant_in_gap", "border", "absolute", "rounding_level", "unknown", "probe"),
+    *("probe_parts", "steady"),
     *("overshoot", "jumps_at_once", "jumps_in_window", "accumulation", "spread", "crowd", "resolved", "chatter"),
     *("pause", "euler_part", "blind_part", "first_growth", "first_least", "reach_step", "reach_at"),
 )

@@ -41,12 +41,14 @@ typedef struct {
 } ModelJump;
 
 #define N_REACH_AT 4
+#define N_PROBE_PARTS 13
 /* The numbers of the semantics, none of which is in seconds or in the unit of a state: see
    hybrid_model/scales.py, from which the generator takes them. */
 typedef struct {
     double roundings, instant, instant_in_gap, border, absolute, rounding_level, unknown, probe, overshoot;
     double jumps_at_once, jumps_in_window, accumulation, spread, crowd, resolved, chatter, pause;
     double euler_part, blind_part, first_growth, first_least, reach_step, reach_at[N_REACH_AT];
+    double probe_parts[N_PROBE_PARTS], steady;
 } ModelScales;
 
 typedef struct {

@@ -1,4 +1,5 @@
 /* The margins of the jump sets and of the flow set at a point, and whether a flow may begin there. */
+#include <float.h>
 #include <math.h>
 
 #include "parts.h"
@@ -103,23 +104,55 @@ double engine_flow_border(Engine *engine, const Point *point, double t, const do
     return isfinite(width) ? width : 0.0;
 }
 
+/* How the margin of the flow set changes along the flow in a time; not a number if that cannot be told.  Nothing is
+   evaluated beyond the end of the run. */
+static bool margin_change(Engine *engine, const Point *point, double margin, double span, double *change)
+{
+    double t = *point->time;
+    bool forward = t + span <= engine->status->stop_time;
+    double there = forward ? t + span : t - span;
+    *change = NAN;
+    if (there < engine->status->start_time)
+        return true;
+    if (!engine_step_probe(engine, point, there))
+        return false;
+    *change = trial_margin(engine, there, engine->probe_x, point->z) - margin;
+    if (!forward)
+        *change = -*change;
+    return true;
+}
+
+static double largest_shown(const Engine *engine, const Point *point)
+{
+    double largest = 0.0;
+    for (size_t i = 0; i < engine->model->n_states; i++)
+        largest = fmax(largest, engine_state_size(engine, point, i, point->x[i]));
+    return largest;
+}
+
 bool engine_leads_out(Engine *engine, const Point *point, double margin, bool *out)
 {
     const Status *status = engine->status;
+    const ModelScales *scales = &engine->model->scales;
     double h, t = *point->time;
     if (!engine_first_step(engine, point, fmax(status->stop_time, t), &h))
         return false;
-    double probe = engine->model->scales.probe * h;
-    /* Nothing is evaluated beyond the end of the run. */
-    bool forward = t + probe <= status->stop_time;
+    double probe = scales->probe * h, change, twice;
+    /* As long as no state has shown its size, the step may be far too long. */
+    bool shown = largest_shown(engine, point) >= fmax(status->floor, DBL_MIN);
     *out = false;
-    if (!forward && t - probe < status->start_time)
-        return true;
-    double there = forward ? t + probe : t - probe;
-    if (!engine_step_probe(engine, point, there))
-        return false;
-    double change = trial_margin(engine, there, engine->probe_x, point->z) - margin;
-    *out = forward ? change < 0.0 : change > 0.0;
+    for (size_t i = shown ? N_PROBE_PARTS - 1 : 0; i < N_PROBE_PARTS; i++) {
+        double span = scales->probe_parts[i] * probe;
+        if (!margin_change(engine, point, margin, span, &change))
+            return false;
+        *out = change < 0.0;
+        if (i + 1 == N_PROBE_PARTS || !(fabs(change) > 0.0))
+            continue;
+        if (!margin_change(engine, point, margin, 2.0 * span, &twice))
+            return false;
+        if (fabs(twice - 2.0 * change) <= scales->steady * fabs(twice))
+            return true;
+    }
     return true;
 }
 

@@ -15,7 +15,8 @@ from hybrid_model.declare.variables import FloatArray
 from hybrid_model.errors import SimulationError
 from hybrid_model.reference.first_step import first_step
 from hybrid_model.reference.point import Point
-from hybrid_model.scales import PROBE, REACH_AT, REACH_STEP, moves, one_instant, usual_sizes
+from hybrid_model.reference.zero_crossings import SMALLEST
+from hybrid_model.scales import PROBE, PROBE_PARTS, REACH_AT, REACH_STEP, STEADY, moves, one_instant, usual_sizes
 
 ORDER = 7
 """Of the step that probes are a part of."""
@@ -98,21 +99,35 @@ def one_instant_on(point: Point, rates: FloatArray) -> FloatArray | None:
 
 def leads_out(point: Point) -> bool:
     """Whether the flow leads out of the flow set from the present point, which is on its border."""
-    t, x = point.t, point.x
-    rates = quiet_rates(point, t, x)
+    rates = quiet_rates(point, point.t, point.x)
     if not np.isfinite(rates).all():
         return False
     probe = PROBE * step_from(point, point.t_stop)
-    forward = t + probe <= point.t_stop
-    if not forward and t - probe < point.t_start:
-        return False
-    there = t + probe if forward else t - probe
+    shown = float(point.sizes.max(initial=0.0)) >= max(point.floor, SMALLEST)
+    margin = point.flow_margin()
+    for span in (probe,) if shown else (part * probe for part in PROBE_PARTS):
+        change = _margin_change(point, rates, margin, span)
+        if span < probe:
+            twice = _margin_change(point, rates, margin, 2.0 * span)
+            if change == 0.0 or not abs(twice - 2.0 * change) <= STEADY * abs(twice):
+                continue
+        return change < 0.0
+    return False
+
+
+def _margin_change(point: Point, rates: FloatArray, margin: float, span: float) -> float:
+    """Return how the margin of the flow set changes along the flow in a time; not a number if that cannot be told."""
+    t, x = point.t, point.x
+    forward = t + span <= point.t_stop
+    if not forward and t - span < point.t_start:
+        return math.nan
+    there = t + span if forward else t - span
     u = point.inputs.at(there if forward else t)
     found = look(point, there, x + (there - t) * rates, u)
     if found is None:
-        return False
-    change = float(found[-1]) - point.flow_margin()
-    return change < 0.0 if forward else change > 0.0
+        return math.nan
+    change = float(found[-1]) - margin
+    return change if forward else -change
 
 
 def step_from(point: Point, end: float) -> float:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_automata import Ramp
+from witnesses import FlowFirst
 
 import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
@@ -238,3 +239,19 @@ def test_models_carry_every_number_that_the_engine_in_c_reads():
     assert sorted(names) == sorted(scales.of_models())
     assert int(re.search(r"#define N_REACH_AT (\d+)", engine)[1]) == len(scales.REACH_AT)
     assert int(re.search(r"#define N_GAPS (\d+)", engine)[1]) == GAPS
+
+
+@pytest.mark.parametrize("t_stop", [None, 5.5, 1e6, 1e9, 1e30])
+def test_a_distant_end_or_none_changes_nothing_at_a_border(exported, t_stop):
+    """At the start x = 0 has shown no size: what the end of the run makes of its steps must not hide where it goes."""
+    turns = [1.0, 2.0, 3.0, 4.0, 5.0]
+    if t_stop is not None:
+        arc = hm.simulate(FlowFirst(), t_stop, zeno=hm.ZenoGuard(max_jumps=5))
+        assert [jump.t for jump in arc.jumps[:5]] == pytest.approx(turns, abs=1e-12)
+    slave = FmuSlave("a", exported(FlowFirst(), "flow_first"))
+    slave.start(0.0, t_stop, events=False)
+    slave.begin()
+    made = slave.step(0.0, 5.4)
+    assert made.reached == 5.4
+    assert slave.get("turns") == 5
+    slave.close()
