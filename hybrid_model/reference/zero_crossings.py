@@ -13,7 +13,7 @@ the default solver is such a polynomial. A kink ends the halving where the margi
 `HALVINGS` of them. What can be missed is a feature that no sample shows: a peak, sharp against the distance of
 neighbouring samples, which is at most a fifth of the step. More `scan_points` or a `max_step` make that smaller.
 
-The C engine of exported FMUs (hybrid_model/engine/rises.c) decides in the same way.
+The C engine of exported FMUs (hybrid_model/engine/location/rises.c) decides in the same way.
 """
 
 from __future__ import annotations

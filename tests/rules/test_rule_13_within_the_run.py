@@ -21,9 +21,9 @@ class Spy(InOtherTime):
         super().__init__(automaton, 1.0)
         self.asked = set()
 
-    def own(self, s):
+    def inner(self, s):
         self.asked.add(float(s.t))
-        return super().own(s)
+        return super().inner(s)
 
 
 @pytest.mark.parametrize("name", QUICK)
