@@ -141,7 +141,7 @@ def test_internal_breakpoints_are_in_the_arcs():
     network = consensus.closed_loop(scenario)
     run = hm.simulate_network(network, 4.0)
     for arc in run.arcs.values():
-        times = [jump.t for jump in arc.jumps if jump.name == "weights.gate"]
+        times = [jump.t for jump in arc.jumps if jump.name == "weights.piece"]
         assert len(times) > 5
         assert all(info.trigger is Trigger.TIME for info in arc.automaton.jumps if info.internal)
 
