@@ -11,8 +11,9 @@ export OPENBLAS_NUM_THREADS := 1
 run: $(READY)
 	$(BIN)/hybrid-fmu paper --out results
 
+# Neighbours in a file share what they make, so each process begins with tests that lie together.
 test: lint
-	$(BIN)/python -m pytest -n 2 -m "not long and not faults"
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long and not faults"
 
 # Also draws fresh cases for the tests that draw any; SEED=N draws those of an earlier run again.
 SEED ?= $(shell od -An -N4 -tu4 /dev/urandom | tr -d ' ')
