@@ -43,7 +43,7 @@ FIRST_LEAST = 64.0
 """In ulp: the shortest first step."""
 PROBE = 1e-6
 """Where a flow leads from a border is looked at after this part of a step of the solver."""
-PROBE_PARTS = tuple(10.0 ** (-3 * k) for k in range(12, -1, -1))
+PROBE_PARTS = (1e-6, 1e-3, 1.0)
 """And after these parts of that, the shortest first, while no state has shown its size: the step may be too long."""
 STEADY = 0.25
 """What changes twice as much in twice the time, but for this part, is no rounding: it shows where a flow leads."""

@@ -1,1 +1,1 @@
-"""The command line: the only place that imports hybrid_model, fmu and cosim together."""
+"""The command line: the only place of `cosim` that knows the exporter and `fmu.validate` too. It imports everything."""

@@ -2,7 +2,8 @@
 
 Source: S. Arun Kumar, N. R. Chowdhury, S. Srikant, J. Raisch, "Consensus analysis of systems with time-varying
 interactions: an event-triggered approach" ("the paper" in this package). What holds of its formulas, and what holds
-instead, is in docs/paper-audit.md; "audit" with the number of a section means that page.
+instead, is in docs/paper-audit.md; "audit" with the number of a section means that page. The rooms are a ladder that
+pyproject.toml holds: `graphs` at its foot, `figures` at its top.
 """
 
 from hybrid_model.consensus.certificates.certify import Certificates, certify

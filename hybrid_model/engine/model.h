@@ -41,7 +41,7 @@ typedef struct {
 } ModelJump;
 
 #define N_REACH_AT 4
-#define N_PROBE_PARTS 13
+#define N_PROBE_PARTS 3
 /* The numbers of the semantics, none of which is in seconds or in the unit of a state: see
    hybrid_model/scales.py, from which the generator takes them. */
 typedef struct {

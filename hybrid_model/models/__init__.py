@@ -1,4 +1,4 @@
-"""Model library: small automata with known answers."""
+"""Model library: small automata with known answers. It imports what its users import: `hybrid_model`."""
 
 from hybrid_model.models.analog_digital import (
     AnalogDigitalConverter,

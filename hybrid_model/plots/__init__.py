@@ -1,4 +1,4 @@
-"""Plots of runs on hybrid time.
+"""Plots of runs on hybrid time. They import `declare` and `record`.
 
 Every function draws into the axes given as ``ax``, or into a new figure, and returns the axes. Flows are solid, jumps
 dashed; an open marker is the value before a jump, a filled one the value after it. Functions draw with the colours and

@@ -66,6 +66,17 @@ def test_a_name_that_is_not_there_is_seen():
     assert not resolves("fmu.export.import_fmu")
 
 
+@pytest.mark.parametrize("page", [page for page in PAGES if page.name != HISTORY], ids=lambda page: page.name)
+def test_what_the_code_of_a_page_imports_is_there(page):
+    text = page.read_text(encoding="utf-8")
+    wanted = [
+        f"{module}.{name.split(' as ')[0].strip()}"
+        for module, names in re.findall(r"from ((?:hybrid_model|fmu|cosim)[\w.]*) import ([\w, ]+)", text)
+        for name in names.split(",")
+    ]
+    assert [name for name in wanted if not resolves(name)] == []
+
+
 def test_docstrings_name_modules_that_are_there():
     """Names of modules in the docstrings and comments of the packages."""
     wrong = []

@@ -1,4 +1,4 @@
 """Figures of runs and certificates, as files.
 
-It imports all other rooms of `consensus`.
+It imports `certificates`, `runs`, `laws` and `scenario`, and draws with `hybrid_model.plots`.
 """

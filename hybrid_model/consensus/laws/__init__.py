@@ -1,4 +1,4 @@
 """Agents, event generators, channels, and the closed loop made of them.
 
-It imports `scenario` and `weights`.
+It imports `scenario`, `weights`, `switching` and `clocks`.
 """

@@ -27,9 +27,8 @@ from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton, Foreseen
 from hybrid_model.consensus.weights.gated_sine import GatedAbsoluteSineWeights, GatedSineWeights
 from hybrid_model.consensus.weights.sine import SineWeights
 from hybrid_model.declare.variables import Value
+from hybrid_model.scales import INSTANT
 
-INSTANT = 1e-9
-"""In s: alarms so close are one instant."""
 NONE = -1.0
 """A time that means never: a discrete state holds finite numbers only, and no run begins before zero."""
 
@@ -111,7 +110,7 @@ class SelfTrigger(EventGenerator, ForeseenWeights):
         instant of another (rule 6): rounding must not decide which of two symmetric agents broadcasts.
         """
         plan = self._plan(s, self.present(s), self.predicted(s), s.broadcast, s.neighbours)
-        is_now = np.logical_and(s.due >= 0.0, s.due <= s.t + INSTANT)
+        is_now = np.logical_and(s.due >= 0.0, s.due <= s.t * (1.0 + INSTANT))
         return {
             "heard": s.neighbours,
             **plan,

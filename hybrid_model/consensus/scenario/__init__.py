@@ -1,4 +1,4 @@
 """Scenarios: checked data, and the TOML files that they are read from.
 
-It imports `weights` and `graphs`; nothing here runs.
+It imports `weights`, `switching` and `graphs`; nothing here runs.
 """
