@@ -24,7 +24,7 @@ static bool refused(Engine *engine, Ending ending, size_t jump, size_t i, double
 {
     const Model *m = engine->model;
     bool starts = jump == m->n_jumps;
-    return engine_fail(engine, ending, "'%s' becomes %.9g at t = %.17g by %s%s%s; %s",
+    return engine_fail(engine, ending, "'%s' becomes %.17g at t = %.17g by %s%s%s; %s",
                        NAME_AT(m->names, engine_state_name(m, i)), engine->reset.x[i], t,
                        starts ? "its start value" : "the jump map of '",
                        starts ? "" : NAME_AT(m->names, m->jumps[jump].name), starts ? "" : "'", rule);

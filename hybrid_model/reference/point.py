@@ -224,7 +224,7 @@ class Point:
         if fractions.any():
             k = int(fractions.argmax())
             raise SimulationError(
-                f"{self.automaton.name}: {self.layout.names(Kind.DISCRETE)[k]} = {z[k]:.9g} {when}: it is declared "
+                f"{self.automaton.name}: {self.layout.names(Kind.DISCRETE)[k]} = {z[k]:.17g} {when}: it is declared "
                 "integer and must stay a whole number."
             )
 

@@ -57,8 +57,9 @@ class Halves(hm.HybridAutomaton):
     """An integer that a jump makes a fraction."""
 
     k = hm.DiscreteState(1, integer=True, output=True)
+    more = hm.Parameter(0.5)
 
-    transitions = (hm.TimeEvent("tick", lambda self, s: 1.0 * s.k, lambda self, s: {"k": s.k + 0.5}),)
+    transitions = (hm.TimeEvent("tick", lambda self, s: 1.0 * s.k, lambda self, s: {"k": s.k + s.more}),)
 
 
 class Still(hm.HybridAutomaton):
@@ -111,6 +112,7 @@ class YesOrNoJump(hm.HybridAutomaton):
 @pytest.mark.parametrize(
     ("automaton", "words"),
     [
+        (Halves(name="Rounded", more=2.0**-40), ["k", f"{1 + 2**-40:.17g}", "t = 1 ", "must stay a whole number"]),
         (Halves(), ["k", "1.5", "t = 1 ", "tick", "declared integer and must stay a whole number"]),
         (Still(), ["time event 'tick' was due at 1 s and after its jump is due at 1 s", "move its time on"]),
         (StillInside(), ["time event 'tick' was due at 1 s and after its jump is due at 1 s", "move its time on"]),
