@@ -1,4 +1,4 @@
-"""The C code of a network: the functions of its groups, and the tables that fmu/runtime/network*.c run over."""
+"""The C code of a network: the functions of its groups, and the tables that hybrid_model/engine/networks run over."""
 
 from __future__ import annotations
 
