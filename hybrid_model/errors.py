@@ -31,3 +31,7 @@ class DataError(HybridModelError, ValueError):
 
 class SchedulingError(HybridModelError, RuntimeError):
     """Blocks that meet at events contradict what they announced, or iterate without end."""
+
+
+class BuildError(HybridModelError, RuntimeError):
+    """Generated or kept C could not be compiled: there is no compiler, or it fails."""

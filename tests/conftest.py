@@ -10,6 +10,7 @@ from fmi_driver.journey import SETTINGS, instance
 from hypothesis import HealthCheck, settings
 
 from fmu.export import export_fmu
+from hybrid_model.native.build.cache_folder import zig_folder
 
 # Nothing that depends on the speed of the machine may decide about a verdict: no deadline, no check for slowness.
 TIMELESS = {"database": None, "deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
@@ -28,16 +29,29 @@ def fingerprint(automaton):
 
 
 @pytest.fixture(scope="session")
-def exported(tmp_path_factory):
-    """Export an automaton once a session, key and version, whatever the number of test processes."""
+def run_folder(tmp_path_factory):
+    """The folder for temporary files that all processes of this run of the tests share."""
     root = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        root = root.parent
+    return root.parent if "PYTEST_XDIST_WORKER" in os.environ else root
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache(run_folder):
+    """What is compiled is kept for this run; the user's cache is left alone, apart from zig's, which takes minutes."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("ZIG_GLOBAL_CACHE_DIR", str(zig_folder()))
+        patch.setenv("HYBRID_FMU_CACHE", str(run_folder / "cache"))
+        yield
+
+
+@pytest.fixture(scope="session")
+def exported(tmp_path_factory, run_folder):
+    """Export an automaton once a session, key and version, whatever the number of test processes."""
     own = tmp_path_factory.mktemp("exports")
 
     def export(automaton, key=None, fmi="3.0", clocks=True):
         key = (key or automaton.name) + ("" if fmi == "3.0" else f"-fmi{fmi}") + ("" if clocks else "-no-clocks")
-        folder = root / "fmus" / fingerprint(automaton)
+        folder = run_folder / "fmus" / fingerprint(automaton)
         folder.mkdir(parents=True, exist_ok=True)
         path, claim = folder / f"{key}.fmu", folder / f"{key}.claim"
         while not path.exists():

@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 from fmu.archives.writing import replacing
-from fmu.build.compiler import find_compiler, zig_compiler
 from fmu.build.libraries import build_libraries
 from fmu.build.platforms import Platform, chosen_platforms, library_members, this_platform
+from fmu.build.refusals import refusals
 from fmu.errors import BuildError
+from hybrid_model.native.build.compiler import find_compiler, zig_compiler
 from hybrid_model.native.engine_files import ENGINE_FOLDERS
 
 OWN_FOLDERS = (*ENGINE_FOLDERS, Path(__file__).resolve().parents[1] / "interface")
@@ -155,7 +156,8 @@ def _compiler_for(platforms: Sequence[Platform]) -> list[str]:
         here = tuple(platforms) == (this_platform(),)
     except BuildError:
         here = False
-    return find_compiler() if here else zig_compiler()
+    with refusals():
+        return find_compiler() if here else zig_compiler()
 
 
 def _checked(sources: Sequence[Path]) -> list[Path]:

@@ -15,14 +15,12 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from fmu.build.compiler import compiler_identity, is_zig
-from fmu.build.jobs import Task, run_all
 from fmu.build.mach_o import export_only
 from fmu.build.platforms import Platform
-
-COMMON_FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
-STRICT_FLAGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wformat=2", "-Werror")
-GENERATED_FLAGS = ("-Wall", "-Wno-unused-function", "-Wno-unused-variable", "-Wno-unused-but-set-variable")
+from fmu.build.refusals import refusals
+from hybrid_model.native.build.compiler import compiler_identity, is_zig
+from hybrid_model.native.build.jobs import Task, run_all
+from hybrid_model.native.build.objects import COMMON_FLAGS, GENERATED_FLAGS, STRICT_FLAGS
 
 _LINUX_LINK = "-Wl,-z,defs,-z,noexecstack,-z,relro,-z,now"
 _OBJECT_LIMIT = 500
@@ -40,6 +38,7 @@ class _Object:
     key: str | None
 
 
+@refusals()
 def build_libraries(
     sources: Sequence[Path],
     own_folders: Sequence[Path],

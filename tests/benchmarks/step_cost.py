@@ -23,10 +23,10 @@ import fmpy
 import numpy as np
 
 from fmu.build.binaries import fmi_headers
-from fmu.build.compiler import find_compiler
-from fmu.build.libraries import COMMON_FLAGS, STRICT_FLAGS
 from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.build.compiler import find_compiler
+from hybrid_model.native.build.objects import COMMON_FLAGS, STRICT_FLAGS
 
 HERE = Path(__file__).parent
 HEIGHT, GRAVITY, RESTITUTION = 1.0, 9.81, 0.7

@@ -12,10 +12,10 @@ import pytest
 from catalogue import cases
 
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files
-from fmu.build.compiler import find_compiler
 from fmu.describe.variables import Fmi
 from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.build.compiler import find_compiler
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="reads ELF files by the tools of binutils")
 needs_tools = pytest.mark.skipif(not (shutil.which("nm") and shutil.which("readelf")), reason="needs nm and readelf")

@@ -16,8 +16,8 @@ import fmu.build.binaries
 import fmu.build.libraries
 from fmu.archives.writing import check_target, package
 from fmu.build.binaries import binaries, compile_fmu, fmi_headers, runtime_sources
-from fmu.build.compiler import find_compiler
 from fmu.errors import BuildError
+from hybrid_model.native.build.compiler import find_compiler
 
 # The smallest library with an FMI function, and what a model's generated code may hold.
 VERSION = """
@@ -210,7 +210,7 @@ def test_the_first_error_stops_the_other_compilers(tmp_path, monkeypatch):
     )
     script.chmod(0o755)
     monkeypatch.setenv("CC", str(script))
-    monkeypatch.setattr("fmu.build.jobs._processors", lambda: 2)
+    monkeypatch.setattr("hybrid_model.native.build.jobs._processors", lambda: 2)
     for name in ("slow.c", "bad.c"):
         (tmp_path / name).write_text("int x;\n")
     with pytest.raises(BuildError, match=r"(?s)compile 'bad.c'.*wrong"):
@@ -307,29 +307,6 @@ def test_same_sources_in_two_folders_give_the_same_bytes(tmp_path):
 
 
 # ---- which compiler ----
-
-
-def test_compiler_is_taken_from_the_environment(monkeypatch):
-    monkeypatch.setenv("CC", f"{find_compiler()[0]} -pipe")
-    assert find_compiler()[1:] == ["-pipe"]
-    monkeypatch.setenv("CC", "no-such-compiler")
-    with pytest.raises(BuildError, match=r"CC is 'no-such-compiler'.*Remedy"):
-        find_compiler()
-
-
-def test_no_compiler_says_what_to_install(monkeypatch):
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setattr("shutil.which", lambda name: None)
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(BuildError, match=r"Remedy: install a C compiler"):
-        find_compiler()
-
-
-def test_ziglang_is_the_last_resort(monkeypatch):
-    monkeypatch.delenv("CC", raising=False)
-    monkeypatch.setattr("shutil.which", lambda name: None)
-    monkeypatch.setattr("importlib.util.find_spec", lambda name: object() if name == "ziglang" else None)
-    assert find_compiler()[1:] == ["-m", "ziglang", "cc"]
 
 
 def test_other_platforms_need_ziglang(monkeypatch, tmp_path):

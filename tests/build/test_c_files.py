@@ -8,7 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 import pytest
 
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files
-from fmu.build.compiler import find_compiler
+from hybrid_model.native.build.compiler import find_compiler
 
 pytestmark = pytest.mark.skipif(not shutil.which("nm"), reason="needs nm")
 PREFIXES = {"engine": "engine_", "networks": "network_", "interface": "instance_"}

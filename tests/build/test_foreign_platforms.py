@@ -16,9 +16,10 @@ from catalogue import cases
 from fmpy import read_model_description
 
 from fmu.build.binaries import fmi_headers
-from fmu.build.compiler import cache_folder, find_compiler, zig_compiler
 from fmu.build.platforms import PLATFORMS, this_platform
 from fmu.export import export_fmu
+from hybrid_model.native.build.cache_folder import zig_folder
+from hybrid_model.native.build.compiler import find_compiler, zig_compiler
 
 pytestmark = [
     pytest.mark.long,
@@ -59,7 +60,7 @@ def program(platform, folder):
     path = folder / f"run-{platform}.exe"
     flags = ["-std=c99", "-O1", "-Wall", "-Wextra", "-Werror", "-D_DEFAULT_SOURCE", f"-I{fmi_headers()}"]
     libraries = [] if "windows" in platform else ["-ldl"]
-    environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(cache_folder()), "ZIG_LOCAL_CACHE_DIR": str(folder)}
+    environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(zig_folder()), "ZIG_LOCAL_CACHE_DIR": str(folder)}
     subprocess.run([*command, *flags, DRIVER, "-o", path, *libraries], env=environment, check=True)
     return path
 

@@ -19,7 +19,6 @@ import pytest
 import fmu.build.binaries
 import fmu.build.libraries
 from fmu.build.binaries import compile_fmu, fmi_headers
-from fmu.build.compiler import cache_folder, is_zig
 from fmu.build.mach_o import export_only, universal
 from fmu.build.platforms import PLATFORMS, chosen_platforms, library_members, this_platform
 from fmu.describe.variables import Fmi
@@ -110,33 +109,6 @@ def test_a_machine_without_a_platform_is_told_what_can_be_built(monkeypatch):
     with pytest.raises(BuildError, match=r"'riscv64-\w+'.*Remedy: name one"):
         chosen_platforms(None)
     assert chosen_platforms(["x86_64-linux"])
-
-
-@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="the rule of other systems")
-def test_the_cache_is_where_users_keep_caches(monkeypatch, tmp_path):
-    for name in ("ZIG_GLOBAL_CACHE_DIR", "XDG_CACHE_HOME"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv("HOME", str(tmp_path))
-    assert cache_folder() == tmp_path / ".cache" / "hybrid-fmu" / "zig"
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
-    assert cache_folder() == tmp_path / "caches" / "hybrid-fmu" / "zig"
-    monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", str(tmp_path / "zig"))
-    assert cache_folder() == tmp_path / "zig"
-
-
-@pytest.mark.parametrize(
-    ("command", "answer"),
-    [
-        (["python", "-m", "ziglang", "cc"], True),
-        (["/opt/zig/zig", "cc"], True),
-        (["C:/zig.exe", "cc"], True),
-        (["cc"], False),
-        (["gcc", "-pipe"], False),
-        (["/home/zig/bin/gcc"], False),
-    ],
-)
-def test_zig_is_recognised_by_its_command(command, answer):
-    assert is_zig(command) is answer
 
 
 # ---- libraries ----

@@ -13,11 +13,11 @@ import subprocess
 from pathlib import Path
 
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files, runtime_sources
-from fmu.build.compiler import find_compiler
 from fmu.build.fmu_code import fmu_code
 from fmu.describe.variable_table import fmu_variables
 from fmu.describe.variables import Fmi
 from hybrid_model import Automaton
+from hybrid_model.native.build.compiler import find_compiler
 from hybrid_model.native.trace import trace
 
 HERE = Path(__file__).parent

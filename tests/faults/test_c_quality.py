@@ -11,8 +11,8 @@ from c_harness import VERSIONS, generated, run
 from c_witnesses import WITNESSES
 
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files, runtime_sources
-from fmu.build.compiler import find_compiler
-from fmu.build.libraries import STRICT_FLAGS
+from hybrid_model.native.build.compiler import find_compiler
+from hybrid_model.native.build.objects import STRICT_FLAGS
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="gcc and binutils on Linux")
 SOURCES = own_files("*.c")

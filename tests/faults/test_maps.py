@@ -12,9 +12,9 @@ import pytest
 from catalogue import cases
 
 from fmu.build.binaries import OWN_FOLDERS
-from fmu.build.compiler import find_compiler
-from fmu.build.libraries import COMMON_FLAGS
 from hybrid_model.declare.variables import Kind
+from hybrid_model.native.build.compiler import find_compiler
+from hybrid_model.native.build.objects import COMMON_FLAGS
 from hybrid_model.native.model_code import model_code
 from hybrid_model.native.trace import trace
 

@@ -10,8 +10,8 @@ from c_harness import VERSIONS
 from witnesses import Mix
 
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, runtime_sources
-from fmu.build.compiler import find_compiler
 from fmu.export import export_fmu
+from hybrid_model.native.build.compiler import find_compiler
 
 pytestmark = [
     pytest.mark.faults,

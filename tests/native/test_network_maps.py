@@ -10,14 +10,14 @@ from catalogue import cases
 
 import hybrid_model as hm
 from fmu.build.binaries import OWN_FOLDERS, own_files
-from fmu.build.compiler import find_compiler
-from fmu.build.libraries import GENERATED_FLAGS, STRICT_FLAGS
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import Kind
 from hybrid_model.declare.vector_form import vector_form
 from hybrid_model.models import BouncingBall
+from hybrid_model.native.build.compiler import find_compiler
+from hybrid_model.native.build.objects import GENERATED_FLAGS, STRICT_FLAGS
 from hybrid_model.native.networks.network import network_trace
 from hybrid_model.native.trace import trace
 

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from fmu.errors import BuildError
+from hybrid_model.errors import BuildError
 
 IMPORTANT_VARIABLES = ("PATH", "CPATH", "C_INCLUDE_PATH", "GCC_EXEC_PREFIX", "COMPILER_PATH", "SDKROOT")
 """Of the environment: what can change a compiler's results."""
@@ -72,23 +72,6 @@ def zig_compiler() -> list[str]:
 def is_zig(command: Sequence[str]) -> bool:
     """Return whether a compiler's command is that of zig, which has a target for each platform."""
     return "cc" in command[1:] and any(part == "ziglang" or Path(part).stem == "zig" for part in command)
-
-
-def cache_folder() -> Path:
-    """Return the folder where zig keeps the C libraries of the platforms that it has built for.
-
-    It is the environment variable ``ZIG_GLOBAL_CACHE_DIR`` if that is set, else the folder ``hybrid-fmu/zig`` in the
-    user's folder for caches. Whatever is in it may be deleted; the next build then takes longer.
-    """
-    if os.environ.get("ZIG_GLOBAL_CACHE_DIR"):
-        return Path(os.environ["ZIG_GLOBAL_CACHE_DIR"]).absolute()
-    if sys.platform == "win32":
-        root = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local"
-    elif sys.platform == "darwin":
-        root = Path.home() / "Library" / "Caches"
-    else:
-        root = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(root).absolute() / "hybrid-fmu" / "zig"
 
 
 def compiler_identity(command: Sequence[str]) -> str:

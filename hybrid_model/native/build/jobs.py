@@ -17,8 +17,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from fmu.build.compiler import cache_folder, not_started
-from fmu.errors import BuildError
+from hybrid_model.errors import BuildError
+from hybrid_model.native.build.cache_folder import zig_folder
+from hybrid_model.native.build.compiler import not_started
 
 REPORT_LINES, REPORT_COLUMNS = 40, 300
 """What is shown of a compiler's report: its first errors are what matters."""
@@ -123,7 +124,7 @@ class _Jobs:
 
 def _environment(scratch: Path) -> dict[str, str]:
     """Return the environment for compilers: temporary files in one folder, plain language, no hidden options."""
-    kept = cache_folder()
+    kept = zig_folder()
     try:
         kept.mkdir(parents=True, exist_ok=True)
         usable = os.access(kept, os.W_OK)

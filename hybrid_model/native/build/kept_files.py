@@ -1,0 +1,172 @@
+"""Files that take long to make, kept in the user's cache under a name that says what they were made from.
+
+A file's name holds the digest of its key and the digest of its content. Each is written under another name and then
+renamed: whoever looks sees a whole file or none, whatever else runs or was killed. A file whose content is not that of
+its name is deleted and made again. Without a cache that can be written, files live as long as the process.
+"""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import os
+import secrets
+import shutil
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from hybrid_model.native.build.cache_folder import is_private, trusted_folder
+
+LIMIT = 512 * 2**20
+"""Bytes that the cache holds at most: in each of its folders an equal share, or a single larger file."""
+_FOLDERS = "0123456789abcdef"
+_DIGITS = 32
+_ABANDONED = 3600.0
+"""Age in s at which an unfinished file has no writer any more."""
+
+
+def kept(name: str, key: str, make: Callable[[Path], None]) -> Path:
+    """Return a file from the cache, made if it is not there.
+
+    Parameters
+    ----------
+    name : str
+        The file's name ends with it.
+    key : str
+        All that the content follows from.
+    make : callable
+        Writes the file to a path that is not in the cache yet. What it raises is passed on.
+
+    Returns
+    -------
+    Path
+        The file, not to be changed. Other processes may delete it once it is the one unused for longest.
+    """
+    found = find(name, key)
+    if found is not None:
+        return found
+    with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as scratch:
+        fresh = Path(scratch).resolve() / name
+        make(fresh)
+        return keep(name, key, fresh.read_bytes())
+
+
+def find(name: str, key: str) -> Path | None:
+    """Return a file that was kept, or None."""
+    digest = _key_digest(name, key)
+    for folder in (_shared(digest), _Own.made()):
+        found = _found(folder, digest) if folder else None
+        if found is not None:
+            return found
+    return None
+
+
+def keep(name: str, key: str, content: bytes) -> Path:
+    """Keep a file, in the cache if that is possible, else for as long as the process runs."""
+    digest = _key_digest(name, key)
+    folder, final = _shared(digest), f"{digest}-{_digest(content)}-{name}"
+    if folder is not None:
+        # Whatever is wrong with it, a full disk or another's lock, this process can go on.
+        with suppress(OSError):
+            return _stored(content, folder, final)
+    return _stored(content, _Own.folder(), final)
+
+
+def _key_digest(name: str, key: str) -> str:
+    return _digest(f"{name}\0{key}".encode())
+
+
+def _digest(content: bytes) -> str:
+    return hashlib.sha256(content).hexdigest()[:_DIGITS]
+
+
+def _shared(digest: str) -> Path | None:
+    """Return the folder of the cache for a key, or None if the cache cannot be used."""
+    root = trusted_folder()
+    if root is None:
+        return None
+    folder = root / digest[0]
+    try:
+        folder.mkdir(mode=0o700, exist_ok=True)
+        return folder if is_private(folder) else None
+    except OSError:
+        return None
+
+
+def _found(folder: Path, digest: str) -> Path | None:
+    """Return the whole file of a key; damaged ones are deleted."""
+    try:
+        names = [name for name in os.listdir(folder) if name.startswith(digest)]
+    except OSError:
+        return None
+    for path in (folder / name for name in names):
+        # It may vanish at any time, and a read-only cache has no times of use.
+        with suppress(OSError):
+            if is_private(path) and _digest(path.read_bytes()) == path.name.split("-")[1]:
+                with suppress(OSError):
+                    os.utime(path)
+                return path
+            path.unlink()
+    return None
+
+
+def _stored(content: bytes, folder: Path, name: str) -> Path:
+    path, temporary = folder / name, folder / f".{secrets.token_hex(8)}"
+    try:
+        temporary.write_bytes(content)
+        temporary.chmod(0o700)
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+    _bound(folder, path)
+    return path
+
+
+def _bound(folder: Path, newest: Path) -> None:
+    """Delete what was not used for longest beyond a folder's share of `LIMIT`, and what writers left unfinished."""
+    files = []
+    for entry in os.scandir(folder):
+        with suppress(OSError):
+            status = entry.stat(follow_symlinks=False)
+            if entry.name.startswith("."):
+                if time.time() - status.st_mtime > _ABANDONED:
+                    os.unlink(entry.path)
+            elif entry.name != newest.name:
+                files.append((status.st_mtime, status.st_size, entry.path))
+    total = newest.stat().st_size
+    for _, size, path in sorted(files, reverse=True):
+        total += size
+        if total > LIMIT // len(_FOLDERS):
+            with suppress(OSError):
+                os.unlink(path)
+
+
+class _Own:
+    """The folder of files that only this process has."""
+
+    _lock = threading.Lock()
+    _folder: tuple[int, Path] | None = None
+
+    @classmethod
+    def made(cls) -> Path | None:
+        # A forked process makes one of its own, and leaves its parent's alone.
+        return cls._folder[1] if cls._folder is not None and cls._folder[0] == os.getpid() else None
+
+    @classmethod
+    def folder(cls) -> Path:
+        with cls._lock:
+            made = cls.made()
+            if made is None:
+                made = Path(tempfile.mkdtemp(prefix="hybrid-fmu-")).resolve()
+                cls._folder = os.getpid(), made
+                atexit.register(_remove, os.getpid(), made)
+            return made
+
+
+def _remove(process: int, folder: Path) -> None:
+    if process == os.getpid():
+        shutil.rmtree(folder, ignore_errors=True)
