@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "parts.h"
+#include "method.h"
 
 /* Hands out pieces of one allocation; without memory it only counts. */
 typedef struct {
@@ -46,8 +46,7 @@ static size_t lay_out_block(Engine *engine, unsigned char *memory)
     engine->history = take(&cursor, m->n_jumps * sizeof(JumpHistory));
     engine->ticked = take(&cursor, m->n_jumps);
     engine->inner_rates = take(&cursor, m->n_states * sizeof(double));
-    for (size_t i = 0; i < N_SEGMENT; i++)
-        engine->segment[i] = take(&cursor, m->n_states * sizeof(double));
+    engine->segment = take(&cursor, engine->method->n_vectors * m->n_states * sizeof(double));
     return cursor.used;
 }
 
@@ -70,8 +69,7 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
         engine->step.k[s] = take(&cursor, vector);
         engine->probe_k[s] = take(&cursor, vector);
     }
-    for (size_t i = 0; i < 3; i++)
-        engine->step.dense[i] = take(&cursor, vector);
+    engine->step.vectors = take(&cursor, engine->method->n_vectors * vector);
     engine->probe_x = take(&cursor, vector);
     engine->dense_x = take(&cursor, vector);
     engine->margins = take(&cursor, rows * sizeof(double));
@@ -91,33 +89,24 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     return cursor.used;
 }
 
-Engine *engine_create(const Model *m, size_t wrapper_size)
+bool engine_take_memory(Engine *engine)
 {
-    Engine *engine = calloc(1, sizeof *engine);
-    if (!engine)
-        return NULL;
-    engine->model = m;
-    engine->wrapper_size = wrapper_size;
     engine->block_size = lay_out_block(engine, NULL);
     engine->block = calloc(1, engine->block_size);
     engine->scratch = calloc(1, lay_out_scratch(engine, NULL));
-    if (!engine->block || !engine->scratch) {
-        engine_free(engine);
-        return NULL;
-    }
+    if (!engine->block || !engine->scratch)
+        return false;
     lay_out_block(engine, engine->block);
     lay_out_scratch(engine, engine->scratch);
-    for (size_t j = 0; j < m->n_jumps; j++)
-        if (m->jumps[j].kind == JUMP_ON_STATE)
-            engine->is_guard[m->jumps[j].index] = 1;
-    engine_reset(engine);
-    return engine;
+    return true;
 }
 
 void engine_free(Engine *engine)
 {
     if (!engine)
         return;
+    for (size_t i = 0; i < N_ROW_KINDS; i++)
+        free(engine->rows[i].values);
     free(engine->block);
     free(engine->scratch);
     free(engine);
@@ -137,20 +126,6 @@ void engine_copy(double *to, const double *from, size_t n)
 void engine_copy_point(const Engine *engine, const Point *from, const Point *to)
 {
     engine_copy(to->time, from->time, point_length(engine->model));
-}
-
-void engine_reset(Engine *engine)
-{
-    const Model *m = engine->model;
-    memset(engine->block, 0, engine->block_size);
-    engine->status->relative_tolerance = RELATIVE_TOLERANCE;
-    engine->status->stop_time = INFINITY;
-    engine_copy(engine->live.x, m->x, m->n_states);
-    engine_copy(engine->live.z, m->z, m->n_discrete);
-    engine_copy(engine->u, m->u, m->n_inputs);
-    engine_copy(engine->p, m->p, m->n_parameters);
-    engine->view = VIEW_NONE;
-    engine_fail(engine, ENDED_NOT, "%s", "");
 }
 
 size_t engine_block_size(const Engine *engine)
@@ -198,8 +173,7 @@ static bool segment_is_sound(const Engine *engine)
     const Status *status = engine->status;
     bool sound =
         isfinite(status->segment_begin) && isfinite(status->segment_end) && status->segment_begin < status->segment_end;
-    for (size_t i = 0; i < N_SEGMENT; i++)
-        sound = sound && all_finite(engine->segment[i], engine->model->n_states);
+    sound = sound && all_finite(engine->segment, engine->method->n_vectors * engine->model->n_states);
     return sound || !status->has_segment;
 }
 
@@ -210,9 +184,8 @@ bool engine_block_is_sound(const Engine *engine, void *block)
     lay_out_block(&other, block);
     const Status *status = other.status;
     bool sound =
-        status->ending >= ENDED_NOT && status->ending <= ENDED_FAILED && status->prediction >= PREDICTION_NONE &&
+        status->ending >= ENDED_NOT && status->ending <= ENDED_JUMPS && status->prediction >= PREDICTION_NONE &&
         status->prediction <= PREDICTION_QUIET && memchr(status->message, '\0', sizeof status->message) != NULL &&
-        status->relative_tolerance >= RELATIVE_TOLERANCE && status->relative_tolerance <= RELATIVE_TOLERANCE_MOST &&
         isfinite(status->start_time) && status->floor >= 0.0 && isfinite(status->floor) && !isnan(status->stop_time) &&
         isfinite(status->jumps_time);
     for (size_t j = 0; j < m->n_jumps; j++)

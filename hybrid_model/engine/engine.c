@@ -5,14 +5,16 @@
 static bool too_many_steps(Engine *engine)
 {
     return engine_fail(engine, ENDED_FAILED,
-                       "More than %d solver steps in one advance; at t = %.17g s the flow of '%s' is too fast for it. "
-                       "Remedy: use shorter communication steps, or look for a stiff or oscillating state.",
-                       ADVANCE_STEPS, *engine->live.time, engine->model->name);
+                       "More than %.0f solver steps in one advance; at t = %.17g s the flow of '%s' is too fast for "
+                       "it. Remedy: use shorter communication steps, or look for a stiff or oscillating state.",
+                       engine->options.steps_at_once, *engine->live.time, engine->model->name);
 }
 
 /* The run is over where a flow cannot go on. */
 static Advance end_with(Engine *engine, FlowEnd end)
 {
+    if (end == FLOW_BUDGET && engine->options.pauses != 0.0)
+        return ADVANCE_PAUSED;
     if (end == FLOW_BUDGET)
         too_many_steps(engine);
     engine_end_run(engine);
@@ -75,7 +77,7 @@ void engine_set_hook(Engine *engine, StepHook hook, void *context)
 
 Advance engine_advance(Engine *engine, double target, EventPolicy policy)
 {
-    size_t budget = ADVANCE_STEPS;
+    size_t budget = (size_t)engine->options.steps_at_once;
     double start = *engine->live.time;
     bool outside = policy == EVENTS_STOP || policy == EVENTS_INSIDE_BEFORE_END;
     FlowEnd end = FLOW_REACHED;

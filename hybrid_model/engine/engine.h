@@ -23,8 +23,23 @@
 
 typedef struct Engine Engine;
 
-/* Why a run cannot go on. */
-typedef enum { ENDED_NOT, ENDED_ZENO, ENDED_BLOCKED, ENDED_NOT_FINITE, ENDED_FAILED } Ending;
+/* Why a run cannot go on.  JUMPS: more than the options allow. */
+typedef enum { ENDED_NOT, ENDED_ZENO, ENDED_BLOCKED, ENDED_NOT_FINITE, ENDED_FAILED, ENDED_JUMPS } Ending;
+
+/* How a run is made: data, which whoever drives an engine may set before it starts.  They are no part of the block. */
+typedef struct {
+    double relative_tolerance;  /* of a step */
+    double absolute_tolerance;  /* of a step, in the unit of each state; 0: a part of the states' own sizes */
+    double longest_step;        /* s */
+    double event_tolerance;     /* s and margin: what counts as one instant, and as a border; 0: follows from the run */
+    /* What counts as an accumulation of jumps: see ZenoGuard in hybrid_model/reference/zeno.py. */
+    double jumps_at_once, jumps_in_window, spread;
+    double window, remainder;   /* s; below 0: follow from the run */
+    double most_jumps;          /* of a run, breakpoints included */
+    double steps_at_once;       /* of the solver in one engine_advance: more end the run, or pause it */
+    double look_ahead_steps, look_ahead_work;   /* of a prediction; work is steps times states, margins and times */
+    double pauses;              /* not 0: an advance that runs out of steps can be gone on with */
+} EngineOptions;
 
 /* What engine_advance does with events. */
 typedef enum {
@@ -38,7 +53,8 @@ typedef enum {
     ADVANCE_REACHED,            /* at the target, nothing pending */
     ADVANCE_EVENT_AT_TARGET,    /* at the target, an event pending */
     ADVANCE_EVENT_BEFORE,       /* at an event before the target */
-    ADVANCE_ENDED               /* the run is over: see engine_message */
+    ADVANCE_ENDED,              /* the run is over: see engine_message */
+    ADVANCE_PAUSED              /* on the way, for want of steps */
 } Advance;
 
 /* Called with each visible jump that is taken. */
@@ -76,6 +92,8 @@ bool engine_block_is_sound(const Engine *engine, void *block);
 /* The importer's layer's part of a block. */
 void *engine_wrapper_in(const Engine *engine, void *block);
 
+/* The options, as engine_reset leaves them: to be changed before engine_start. */
+EngineOptions *engine_options(Engine *engine);
 /* The relative tolerance that an importer wishes for.  It buys speed only within bounds: the engine stays a
    thousand times more precise, so that what it promises of event times holds. */
 void engine_set_tolerance(Engine *engine, double relative);
@@ -134,6 +152,22 @@ bool engine_arrive(Engine *engine);
 /* Whether that importer may go on: false, and the run is over, where the flow leads further out of the flow set.  One
    that has gone too far, or came out by a jump, may find its way back. */
 bool engine_may_flow(Engine *engine);
+
+/* What is kept of a run.  A row of a step: its ends t0 and t1, where it was cut (t1 if it was not), the states there,
+   and the vectors of its interpolation on [t0, t1].  A row of a jump: the number of steps before it, its time, its
+   index, and continuous and discrete states before and after it; breakpoints of the flow are among them.  The first of
+   these rows is the start, with the index n_jumps. */
+typedef enum { RECORD_NOTHING, RECORD_JUMPS, RECORD_ALL } RecordKind;
+typedef enum { ROWS_OF_STEPS, ROWS_OF_JUMPS, N_ROW_KINDS } RowKind;
+/* From now on; what was kept before is dropped. */
+void engine_record(Engine *engine, RecordKind kind);
+/* The rows so far, one after the other, until the engine goes on. */
+const double *engine_rows(const Engine *engine, RowKind kind, size_t *count, size_t *width);
+/* What a run has cost since engine_reset.  Probes: states looked at between the ends of a step. */
+typedef struct {
+    uint64_t steps, rejected, evaluations, jumps, probes;
+} Statistics;
+const Statistics *engine_statistics(const Engine *engine);
 
 /* Visible jumps taken since engine_clear_ticks, with which clocks tick; engine_advance clears them when it begins. */
 bool engine_ticked(const Engine *engine, size_t jump);

@@ -78,7 +78,7 @@ bool engine_first_step(Engine *engine, const Point *point, double limit, double 
     if (!isfinite(turned))
         return true;
     double reach = fmax(known ? size : 0.0, speed * euler);
-    double allowed = scales->euler_part * engine->status->relative_tolerance * reach / speed;
+    double allowed = scales->euler_part * engine->options.relative_tolerance * reach / speed;
     double chosen = turned > 0.0 ? pow(allowed * turned, 1.0 / (ORDER + 1.0)) / turned : (double)INFINITY;
     *h = fmax(least, fmin(fmin(scales->first_growth * euler, chosen), whole));
     return true;

@@ -61,6 +61,8 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
             if (engine->step.t1 >= end && !engine_raise_levels(engine, point, engine->step.t1)) /* line 15 */
                 return FLOW_PROBLEM;
         }
+        if (point == &engine->live && !engine_record_step(engine, engine->step.t1, engine->step.x1))
+            return FLOW_PROBLEM;
         engine_step_commit(engine, point);
         if (point == &engine->live && engine->hook && *point->time < end && !go_on(engine))
             return FLOW_CHANGED;

@@ -93,6 +93,15 @@ static bool moved_on(Engine *engine, size_t jump, double was, const Point *point
                        NAME_AT(engine->model->names, engine->model->jumps[jump].name), was, now);
 }
 
+/* Counts a jump of the live point, breakpoints of the flow as well; false if it uses up those that a run may have. */
+static bool within_budget(Engine *engine)
+{
+    engine->statistics.jumps++;
+    return (double)engine->statistics.jumps < engine->options.most_jumps ||
+           engine_fail(engine, ENDED_JUMPS, "%llu jumps by t = %.9g s.", (unsigned long long)engine->statistics.jumps,
+                       *engine->live.time);
+}
+
 bool engine_apply_reset(Engine *engine, size_t jump, const Point *point)
 {
     const ModelJump *entry = &engine->model->jumps[jump];
@@ -100,7 +109,11 @@ bool engine_apply_reset(Engine *engine, size_t jump, const Point *point)
     if (!evaluate_reset(engine, jump, point))
         return engine_fail(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
                            NAME_AT(engine->model->names, entry->name), *point->time);
-    return accept_state(engine, jump, point) && (entry->kind == JUMP_ON_STATE || moved_on(engine, jump, was, point));
+    if (point == &engine->live && !engine_record_jump(engine, jump))
+        return false;
+    if (!accept_state(engine, jump, point) || (entry->kind == JUMP_ON_TIME && !moved_on(engine, jump, was, point)))
+        return false;
+    return point != &engine->live || within_budget(engine);
 }
 
 /* The first breakpoint of the flow that is due, n_jumps if there is none. */
@@ -133,7 +146,8 @@ bool engine_take_internal_jumps(Engine *engine, const Point *point)
         repeats = internal == last ? repeats + 1 : 1;
         last = internal;
         /* Those that enable each other in turn have an end as well. */
-        if ((double)repeats > m->scales.jumps_at_once || (double)++all > m->scales.jumps_at_once * (double)m->n_times)
+        if ((double)repeats > engine->options.jumps_at_once ||
+            (double)++all > engine->options.jumps_at_once * (double)m->n_times)
             return engine_too_many_at_once(engine, internal, repeats > 1 ? repeats : all, *point->time);
         if (!engine_apply_reset(engine, internal, point))
             return false;
@@ -208,7 +222,8 @@ static bool take_jump(Engine *engine, size_t jump)
 bool engine_start(Engine *engine)
 {
     engine_changed(engine);
-    return engine_apply_start(engine, &engine->live) && engine_take_internal_jumps(engine, &engine->live);
+    return engine_apply_start(engine, &engine->live) && engine_record_jump(engine, engine->model->n_jumps) &&
+           engine_take_internal_jumps(engine, &engine->live);
 }
 
 size_t engine_pending(Engine *engine)

@@ -10,22 +10,17 @@
 #pragma GCC visibility push(hidden)
 #endif
 
-#define N_STAGES 7            /* Dormand-Prince 5(4) */
+#define N_STAGES 7            /* most stages whose rates a method keeps */
 #define N_SAMPLES 9           /* of each margin, where a step is looked at for crossings */
 #define N_GAPS 8              /* gaps of each jump that must look geometric */
 #define N_ZENO_TIMES (N_GAPS + 1)
-#define N_SEGMENT 5           /* vectors that give the state on a step: at its start, its change, its curvature (3) */
 #define MESSAGE_SIZE 768
 
-#define RELATIVE_TOLERANCE 1e-13
-#define RELATIVE_TOLERANCE_MOST 1e-10
-#define LOOK_AHEAD_STEPS 20000
-#define LOOK_AHEAD_WORK 200000    /* steps times states, margins and times */
+#define RELATIVE_TOLERANCE 1e-13  /* below, rounding would decide about steps */
 #define LEAST_STEPS_AHEAD 20
 /* Without a stop time a look ahead ends after so many times the present time, or what the flow shows of its own. */
 #define LOOK_AHEAD_TIMES 1e6
 #define LOOK_AHEAD_EVENTS 1e3
-#define ADVANCE_STEPS 1000000
 /* So many steps of the importer are looked ahead at once. */
 #define STEPS_AHEAD 64.0
 /* A step that communication points are read from is that much shorter than its error allows: the error of the
@@ -53,9 +48,11 @@ typedef struct {
     const double *x0;
     double *x1;
     double *k[N_STAGES];
-    double *dense[3];         /* coefficients of the interpolation, made when first needed */
-    bool has_dense;
+    double *vectors;          /* of the interpolation, made when first needed */
+    bool has_vectors;
 } Step;
+
+typedef struct Method Method;
 
 typedef enum { PREDICTION_NONE, PREDICTION_EVENT, PREDICTION_RENEWAL, PREDICTION_QUIET } Prediction;
 
@@ -73,7 +70,6 @@ typedef struct {
 
 /* The scalars that evolve. */
 typedef struct {
-    double relative_tolerance;
     double floor;                 /* size that all states have at least, where they have shown none by themselves */
     double start_time, stop_time;
     double jumps_time;            /* of the last visible jump */
@@ -88,8 +84,14 @@ typedef struct {
     char message[MESSAGE_SIZE];
 } Status;
 
+typedef struct {
+    double *values;
+    size_t width, count, capacity;
+} Rows;
+
 struct Engine {
     const Model *model;
+    const Method *method;
     /* The block, and what lies in it. */
     unsigned char *block;
     size_t block_size;
@@ -100,7 +102,7 @@ struct Engine {
     double *u, *p;
     JumpHistory *history;
     unsigned char *ticked;        /* by each jump */
-    double *segment[N_SEGMENT];
+    double *segment;              /* vectors of its interpolation */
     double *inner_rates;          /* noted for points outside the flow set */
     /* Scratch: nothing here outlives a call, except the cache of a view. */
     unsigned char *scratch;
@@ -125,6 +127,10 @@ struct Engine {
     void *jump_context;
     double target;                /* of the present advance */
     double largest;               /* state of the present step */
+    EngineOptions options;
+    Statistics statistics;
+    RecordKind record;
+    Rows rows[N_ROW_KINDS];
     Ending problem;
     size_t suspect;               /* the state that the solver blames */
     char problem_message[MESSAGE_SIZE];
@@ -134,8 +140,9 @@ struct Engine {
 typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_CHANGED, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
 
 /* The files of the engine from the lowest to the highest: each calls functions of those before it only.  Those of
-   engine.h are in message.c, block.c, values.c, jumps.c, views.c, sensitivity.c (after differences.c), predict.c,
-   outside.c and engine.c, the last ones; samples.c, rises.c and crossings.c, before locate.c, are in search.h. */
+   engine.h are in message.c, block.c, recorder.c, values.c, jumps.c, create.c, views.c, sensitivity.c (after
+   differences.c), predict.c, outside.c and engine.c, the last ones; samples.c, rises.c and crossings.c, before
+   locate.c, are in search.h; methods, before create.c, in method.h. */
 
 /* message.c */
 /* Notes why something cannot be done; always false, so that callers can return it. */
@@ -152,6 +159,8 @@ void engine_copy(double *to, const double *from, size_t n);
 void engine_copy_point(const Engine *engine, const Point *from, const Point *to);
 /* The number of seeds in one of the engine's two places for them. */
 size_t engine_seed_count(const Model *model);
+/* The block and the scratch, zeroed; the model, the method and the size of the wrapper must be there. */
+bool engine_take_memory(Engine *engine);
 
 /* values.c */
 /* Hands a function of the model its arguments and places for its results. */
@@ -186,16 +195,26 @@ bool engine_step_begin(Engine *engine, const Point *point);
 bool engine_step_accept(Engine *engine, const Point *point, double limit);
 /* The point takes the end of the step. */
 void engine_step_commit(Engine *engine, const Point *point);
-/* One step of the solver from the start of the present one to any time: engine->probe_x. */
+/* The state at any time of the present step, as exact as its end: engine->probe_x. */
 bool engine_step_probe(Engine *engine, const Point *point, double t);
 
 /* dense.c */
+/* The vectors of the interpolation of the present step. */
+const double *engine_step_vectors(Engine *engine);
 /* The interpolation of the present step: engine->dense_x. */
 void engine_step_dense(Engine *engine, double t);
 /* Keeps the present step as a segment on which the live point moves. */
 void engine_segment_keep(Engine *engine);
 /* Moves the live point along the segment. */
 void engine_segment_read(Engine *engine, double t);
+
+/* recorder.c */
+/* Keeps the present step up to `end`, where the states are x. */
+bool engine_record_step(Engine *engine, double end, const double *x);
+/* Keeps a straight way of the live point from the start of the present step to `end`, where the states are x. */
+bool engine_record_line(Engine *engine, double end, const double *x);
+/* Keeps the jump (n_jumps: the start) of the live point to engine->reset. */
+bool engine_record_jump(Engine *engine, size_t jump);
 
 /* sets.c */
 /* How far apart (s) crossings may be at `t` and still be one instant. */

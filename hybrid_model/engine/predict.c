@@ -6,10 +6,12 @@
 
 /* How far a look ahead goes: a call of the importer's must come back in a fraction of a second, also where one
    step of the solver is a matter of thousands of states and margins. */
-static size_t look_ahead_steps(const Model *m)
+static size_t look_ahead_steps(const Engine *engine)
 {
-    size_t size = 1 + m->n_states + m->n_margins + m->n_times, steps = LOOK_AHEAD_WORK / size;
-    return steps > LOOK_AHEAD_STEPS ? LOOK_AHEAD_STEPS : steps < LEAST_STEPS_AHEAD ? LEAST_STEPS_AHEAD : steps;
+    const Model *m = engine->model;
+    const EngineOptions *options = &engine->options;
+    double steps = options->look_ahead_work / (double)(1 + m->n_states + m->n_margins + m->n_times);
+    return (size_t)fmin(fmax(steps, LEAST_STEPS_AHEAD), options->look_ahead_steps);
 }
 
 /* How far a look ahead goes that has no limit: far beyond all that the run has shown of its time scale. */
@@ -31,7 +33,7 @@ bool engine_predict(Engine *engine, double limit, double *event_time)
 {
     Status *status = engine->status;
     double now = *engine->live.time;
-    size_t budget = look_ahead_steps(engine->model);
+    size_t budget = look_ahead_steps(engine);
     status->prediction = PREDICTION_NONE;
     if (status->ending != ENDED_NOT)
         return false;
@@ -55,7 +57,8 @@ void engine_look_ahead(Engine *engine)
 {
     Status *status = engine->status;
     double event, now = *engine->live.time;
-    if (status->settled && status->prediction == PREDICTION_NONE && engine->model->predictable && !engine->hook) {
+    if (status->settled && status->prediction == PREDICTION_NONE && engine->model->predictable && !engine->hook &&
+        engine->record == RECORD_NOTHING) {
         double limit = now + STEPS_AHEAD * (engine->target - now);
         engine_predict(engine, fmin(limit, fmax(status->stop_time, engine->target)), &event);
         /* Nobody has been told to come back where the budget ended: up to there it is quiet. */
@@ -77,7 +80,7 @@ static bool breakpoint_until(const Engine *engine, double target)
 
 void engine_flow_past_event(Engine *engine, double target)
 {
-    size_t before, after, budget = LOOK_AHEAD_STEPS;
+    size_t before, after, budget = (size_t)engine->options.look_ahead_steps;
     engine_copy_point(engine, &engine->live, &engine->shown);
     engine->view = VIEW_NONE;
     if (engine_first_enabled(engine, &engine->live, &before) && !breakpoint_until(engine, target) &&

@@ -8,6 +8,8 @@ double engine_one_instant(const Engine *engine, double t)
 {
     const ModelScales *scales = &engine->model->scales;
     const Status *status = engine->status;
+    if (engine->options.event_tolerance > 0.0)
+        return engine->options.event_tolerance;
     double by_run = scales->instant * (t - status->start_time);
     double by_gap = scales->instant_in_gap * (t - status->jumps_time);
     return fmax(scales->roundings * engine_time_ulp(t), fmin(by_run, by_gap));
@@ -97,6 +99,8 @@ static double change_by_time(Engine *engine, const Point *point, double t, const
 
 double engine_flow_border(Engine *engine, const Point *point, double t, const double *x)
 {
+    if (engine->options.event_tolerance > 0.0)
+        return engine->options.event_tolerance;
     double here = trial_margin(engine, t, x, point->z);
     double by_size =
         fmax(change_by_size(engine, point, t, x, here, false), change_by_size(engine, point, t, x, here, true));

@@ -59,6 +59,7 @@ bool engine_rates(Engine *engine, double t, const double *x, const double *z, do
 {
     if (engine->model->n_states == 0)
         return true;
+    engine->statistics.evaluations++;
     if (engine_evaluate(engine, engine->model->flow, t, x, z, result, NULL))
         return true;
     return engine_fail(engine, ENDED_FAILED, "The flow map of '%s' could not be evaluated at t = %.17g.",
@@ -77,9 +78,9 @@ void engine_changed(Engine *engine)
 
 void engine_set_tolerance(Engine *engine, double relative)
 {
-    /* Below the least rounding would decide about steps; above the greatest event times would suffer. */
-    double tolerance = fmax(fmin(1e-3 * relative, RELATIVE_TOLERANCE_MOST), RELATIVE_TOLERANCE);
-    engine->status->relative_tolerance = tolerance;
+    /* Above the greatest event times would suffer. */
+    const double greatest = 1e-10;
+    engine->options.relative_tolerance = fmax(fmin(1e-3 * relative, greatest), RELATIVE_TOLERANCE);
 }
 
 void engine_set_span(Engine *engine, double start, double stop)

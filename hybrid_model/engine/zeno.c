@@ -24,7 +24,7 @@ static void measure(const ModelScales *scales, JumpHistory *history, double t)
         history->shrinking_from = gap;
 }
 
-static void remember(const ModelScales *scales, JumpHistory *history, double t)
+static void remember(const Engine *engine, JumpHistory *history, double t)
 {
     history->total++;
     history->at_once++;
@@ -32,13 +32,13 @@ static void remember(const ModelScales *scales, JumpHistory *history, double t)
         return;
     history->at_once = 1;
     if (history->stored > 0)
-        measure(scales, history, t);
+        measure(&engine->model->scales, history, t);
     for (size_t i = 0; i + 1 < N_ZENO_TIMES; i++)
         history->times[i] = history->times[i + 1];
     history->times[N_ZENO_TIMES - 1] = t;
     if (history->stored < N_ZENO_TIMES)
         history->stored++;
-    if (history->burst == 0 || (double)history->burst >= scales->jumps_in_window) {
+    if (history->burst == 0 || (double)history->burst >= engine->options.jumps_in_window) {
         history->burst_start = t;
         history->burst = 0;
     }
@@ -49,13 +49,15 @@ static void remember(const ModelScales *scales, JumpHistory *history, double t)
 static bool crowded(const Engine *engine, const JumpHistory *history, double t)
 {
     const ModelScales *scales = &engine->model->scales;
+    const EngineOptions *options = &engine->options;
     double span = t - history->burst_start;
-    double least = scales->jumps_in_window * scales->chatter * engine_time_ulp(t);
-    return (double)history->burst >= scales->jumps_in_window && span <= fmax(scales->crowd * history->longest, least);
+    double least = options->jumps_in_window * scales->chatter * engine_time_ulp(t);
+    double window = options->window >= 0.0 ? options->window : fmax(scales->crowd * history->longest, least);
+    return (double)history->burst >= options->jumps_in_window && span <= window;
 }
 
 /* Whether the newest gaps shrink geometrically: the last gap, and the last ratio. */
-static bool shrinking(const ModelScales *scales, const JumpHistory *history, double *gap, double *ratio)
+static bool shrinking(double spread, const JumpHistory *history, double *gap, double *ratio)
 {
     if (history->stored < N_GAPS + 1)
         return false;
@@ -67,7 +69,7 @@ static bool shrinking(const ModelScales *scales, const JumpHistory *history, dou
         least = fmin(least, *ratio);
         greatest = fmax(greatest, *ratio);
     }
-    return greatest < 1.0 && greatest - least <= scales->spread * *ratio;
+    return greatest < 1.0 && greatest - least <= spread * *ratio;
 }
 
 bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t)
@@ -91,19 +93,21 @@ bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long cou
 bool engine_zeno_record(Engine *engine, size_t jump)
 {
     const ModelScales *scales = &engine->model->scales;
+    const EngineOptions *options = &engine->options;
     JumpHistory *history = &engine->history[jump];
     const char *name = NAME_AT(engine->model->names, engine->model->jumps[jump].name);
     double t = *engine->live.time, gap = 0.0, ratio = 0.0;
-    remember(scales, history, t);
+    remember(engine, history, t);
     unsigned long long total = history->total, burst = history->burst;
-    if ((double)history->at_once > scales->jumps_at_once)
+    if ((double)history->at_once > options->jumps_at_once)
         return engine_too_many_at_once(engine, jump, history->at_once, t);
     /* Times that are known are the author's own. */
     if (engine->model->jumps[jump].kind == JUMP_ON_TIME)
         return true;
-    if (shrinking(scales, history, &gap, &ratio)) {
-        double rest = gap * ratio / (1.0 - ratio);
-        if (rest <= fmax(scales->accumulation * history->shrinking_from, scales->resolved * engine_time_ulp(t)))
+    if (shrinking(options->spread, history, &gap, &ratio)) {
+        double rest = gap * ratio / (1.0 - ratio), remainder = options->remainder;
+        remainder = remainder >= 0.0 ? remainder : scales->accumulation * history->shrinking_from;
+        if (rest <= fmax(remainder, scales->resolved * engine_time_ulp(t)))
             return engine_fail(
                 engine, ENDED_ZENO,
                 "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "

@@ -28,17 +28,40 @@ def model_code(traced: Trace | NetworkTrace) -> str:
     str
         A C99 translation unit that defines ``const Model model``.
     """
-    maps, work = _maps(traced)
-    return "\n".join([_PRELUDE, maps, *_tables(traced), _model(traced, work)])
+    maps, work = _maps(traced, derivatives=True)
+    model = _model(traced, work, traced.automaton.name)
+    return "\n".join([_PRELUDE, maps, *_tables(traced, starts=True), model])
 
 
-def _maps(traced: Trace | NetworkTrace) -> tuple[str, Sequence[int]]:
+def run_code(traced: Trace | NetworkTrace) -> str:
+    """Return the C source of a model that is run in this process, after hybrid_model/engine/runs/exports.c.
+
+    Start values and the instance's name are not in it, since whoever runs it has them, so that instances that differ in
+    them share it; derivatives, which runs do not need, are left out where they are functions of their own.
+
+    Parameters
+    ----------
+    traced : Trace or NetworkTrace
+        The automaton's maps.
+
+    Returns
+    -------
+    str
+        A C99 translation unit that exports ``hybrid_model_of_run``, which returns the model.
+    """
+    maps, work = _maps(traced, derivatives=False)
+    model = _model(traced, work, type(traced.automaton).__name__)
+    return "\n".join([_PRELUDE, maps, *_tables(traced, starts=False), model, _ACCESS])
+
+
+def _maps(traced: Trace | NetworkTrace, *, derivatives: bool) -> tuple[str, Sequence[int]]:
     """Return the definitions of the maps and of their derivatives, and the sizes of the work arrays they need."""
     if isinstance(traced, NetworkTrace):
         return traced.c_code(), traced.work_sizes
-    given = [*traced.functions, *derivative_functions(traced).values()]
+    given = [*traced.functions, *(derivative_functions(traced).values() if derivatives else ())]
     resets = array("ModelFunction", "resets", (reset.name() for reset in traced.resets))
-    code = "\n".join([functions("model", given), '#include "model.h"', "", resets, _RESET])
+    without = [] if derivatives else [_NO_DERIVATIVES]
+    code = "\n".join([functions("model", given), '#include "model.h"', "", resets, _RESET, *without])
     return code, [max(getattr(f, size)() for f in given) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
 
 
@@ -60,14 +83,30 @@ static int hybrid_reset(size_t jump, const double **arg, double **res, long long
     return resets[jump](arg, res, iw, w, 0);
 }
 """
+_NO_DERIVATIVES = "\n".join(f"#define hybrid_{name} NULL" for name in _MAPS[-4:])
+_ACCESS = """
+#if defined(_WIN32)
+__declspec(dllexport)
+#elif defined(__GNUC__)
+__attribute__((visibility("default")))
+#endif
+const Model *hybrid_model_of_run(void);
+const Model *hybrid_model_of_run(void)
+{
+    return &model;
+}
+"""
 
 
-def _tables(traced: Trace | NetworkTrace) -> list[str]:
+def _tables(traced: Trace | NetworkTrace, *, starts: bool) -> list[str]:
     automaton, layout, names = traced.automaton, traced.layout, NameTable()
-    starts = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
+    vectors = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
     margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
     tables = [
-        *(array("double", f"start_{name}", map(constant, layout.start(kind))) for name, kind in starts),
+        *(
+            array("double", f"start_{name}", map(constant, layout.start(kind) * float(starts)))
+            for name, kind in vectors
+        ),
         array("double", "nominals", map(constant, _nominals(layout))),
         array("bool", "whole", map(boolean, layout.whole)),
         array("ModelName", "state_names", map(names.entry, layout.names(Kind.STATE))),
@@ -98,10 +137,10 @@ def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
     return rows
 
 
-def _model(traced: Trace | NetworkTrace, work: Sequence[int]) -> str:
+def _model(traced: Trace | NetworkTrace, work: Sequence[int], name: str) -> str:
     automaton, sizes = traced.automaton, traced.layout.sizes
     fields = {
-        "name": string(automaton.name),
+        "name": string(name),
         "n_states": sizes[Kind.STATE],
         "n_discrete": sizes[Kind.DISCRETE],
         "n_inputs": sizes[Kind.INPUT],

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import bisect
-from collections.abc import Iterable, Sequence
+import functools
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,10 @@ from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, u
 from hybrid_model.errors import DataError, DeclarationError
 from hybrid_model.record.arc_file import read_record, write_record
 from hybrid_model.record.arc_tables import dataframe, dataset
+from hybrid_model.record.flow_points import ends_of, held_in, sampled, sampled_states, starts_of, states_at
 from hybrid_model.record.flow_record import FlowRecord
 from hybrid_model.record.jump_record import JumpRecord
+from hybrid_model.record.row_flows import RowJumps
 from hybrid_model.record.run_record import RunRecord
 from hybrid_model.record.samples import Samples
 
@@ -52,16 +54,19 @@ class HybridArc:
     def __init__(self, record: RunRecord) -> None:
         self._record, self._read, self._flows = record, record.read, record.flows
         self.automaton: Automaton = record.read.automaton
-        self.jumps = list(record.jumps)
         self.stop, self.message, self.event_tolerance = record.stop, record.message, record.event_tolerance
-        self._starts, self._ends = [flow.t0 for flow in record.flows], [flow.t1 for flow in record.flows]
-        times = [[t for t, _ in flow.points] for flow in record.flows]
-        self.t: FloatArray = np.concatenate([np.array(row) for row in times])
-        self.j = np.concatenate([np.full(len(row), record.first_j + k) for k, row in enumerate(times)])
+        self._starts, self._ends = starts_of(record.flows), ends_of(record.flows)
+        self.t, self._numbers = sampled(record.flows)
+        self.j = record.first_j + self._numbers
+
+    @functools.cached_property
+    def jumps(self) -> list[JumpRecord]:
+        """The jumps in order, with the states on both sides."""
+        return list(self._record.jumps)
 
     def __repr__(self) -> str:
         return (
-            f"HybridArc({self.automaton.name}: t from {self.t[0]:g} to {self.t[-1]:g} s, {len(self.jumps)} jumps, "
+            f"HybridArc({self.automaton.name}: t from {self.t[0]:g} to {self.t[-1]:g} s, {len(self._flows) - 1} jumps, "
             f"{self.stop.name})"
         )
 
@@ -73,9 +78,7 @@ class HybridArc:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a variable's samples, shape (n, *shape): a state, input, parameter or output."""
-        shape = self._read.variable(name).shape
-        rows = [self._read.value(name, t, x, flow.z) for flow in self._flows for t, x in flow.points]
-        return np.array(rows, dtype=np.float64).reshape(len(self.t), *shape)
+        return self._read.column(name, self.t, sampled_states(self._flows), held_in(self._flows, self._numbers))
 
     def variable(self, name: str) -> Variable:
         """Return the declaration of a variable: its unit, description, shape.
@@ -116,17 +119,14 @@ class HybridArc:
         times = _times(t)
         if j is None:
             self._require_inside(times)
-            flows = [self._flow_at(float(time), before) for time in times.ravel()]
+            numbers = self._numbers_at(times.ravel(), before)
         else:
             times, counts = np.broadcast_arrays(times, np.asarray(j))
-            flows = [
-                self._flow_on(float(time), count) for time, count in zip(times.ravel(), counts.ravel(), strict=True)
-            ]
-        values = [
-            self._read.value(name, float(time), flow.at(float(time)), flow.z)
-            for time, flow in zip(times.ravel(), flows, strict=True)
-        ]
-        return np.array(values, dtype=np.float64).reshape(times.shape + shape)
+            pairs = zip(times.ravel(), counts.ravel(), strict=True)
+            numbers = np.array([self._number_on(float(time), count) for time, count in pairs], dtype=np.int64)
+        flat = times.ravel()
+        states = states_at(self._flows, numbers, flat)
+        return self._read.column(name, flat, states, held_in(self._flows, numbers)).reshape(times.shape + shape)
 
     # Parts of a run.
 
@@ -152,11 +152,9 @@ class HybridArc:
         """
         a, b = _interval("t", t)
         first, last = _interval("j", j)
-        kept = [
-            k
-            for k, flow in enumerate(self._flows)
-            if first <= self._record.first_j + k <= last and flow.t1 >= a and flow.t0 <= b
-        ]
+        counts = self._record.first_j + np.arange(len(self._flows))
+        inside = (first <= counts) & (counts <= last) & (self._ends >= a) & (self._starts <= b)
+        kept = [int(k) for k in np.flatnonzero(inside)]
         if not kept:
             raise DeclarationError(
                 f"nothing of the run lies in t = [{a:g}, {b:g}] s and j = [{first:g}, {last:g}]: it covers "
@@ -206,8 +204,7 @@ class HybridArc:
             number[firsts] = before
         else:
             number = after
-        points = [(float(t), self._flows[int(k)]) for t, k in zip(times, number, strict=True)]
-        values = self._table(names, [(t, flow.at(t), flow.z) for t, flow in points])
+        values = self._table(names, times, states_at(self._flows, number, times), held_in(self._flows, number))
         return Samples(times, number + self._record.first_j, values)
 
     def samples(self, names: Iterable[str] | None = None) -> Samples:
@@ -218,8 +215,8 @@ class HybridArc:
         names : iterable of str, optional
             Which variables; default: all but the parameters that are fixed for a run.
         """
-        points = [(t, x, flow.z) for flow in self._flows for t, x in flow.points]
-        return Samples(self.t.copy(), self.j.copy(), self._table(names, points))
+        held = held_in(self._flows, self._numbers)
+        return Samples(self.t.copy(), self.j.copy(), self._table(names, self.t, sampled_states(self._flows), held))
 
     # Jumps and lengths.
 
@@ -228,12 +225,15 @@ class HybridArc:
         if name not in [info.name for info in self.automaton.jumps]:
             known = {info.name: info for info in self.automaton.jumps}
             raise DeclarationError(unknown_name(f"{self.automaton.name} (jumps)", name, known))
-        return np.array([jump.t for jump in self.jumps if jump.name == name])
+        jumps = self._record.jumps
+        if isinstance(jumps, RowJumps):
+            return jumps.times(name)
+        return np.array([jump.t for jump in jumps if jump.name == name])
 
     @property
     def flow_lengths(self) -> FloatArray:
         """Length in s of the flow at each j, shape (number of jumps + 1,); zero inside a cascade."""
-        return np.array([flow.t1 - flow.t0 for flow in self._flows])
+        return self._ends - self._starts
 
     def inter_event_times(self, name: str | None = None) -> FloatArray:
         """Return the times in s between successive jumps.
@@ -307,18 +307,11 @@ class HybridArc:
                 "samples alone: give one of these endings."
             )
 
-    def _table(
-        self, names: Iterable[str] | None, points: Sequence[tuple[float, FloatArray, FloatArray]]
-    ) -> dict[str, FloatArray]:
+    def _table(self, names: Iterable[str] | None, t: FloatArray, x: FloatArray, z: FloatArray) -> dict[str, FloatArray]:
         # Parameters are told once, but for those that may change.
         told = [v.name for v in self.automaton.variables if v.tunable or v.kind is not Kind.PARAMETER]
         chosen = told if names is None else names
-        return {
-            name: np.array([self._read.value(name, *point) for point in points], dtype=np.float64).reshape(
-                len(points), *self.variable(name).shape
-            )
-            for name in chosen
-        }
+        return {name: self._read.column(name, t, x, z) for name in chosen}
 
     def _require_inside(self, times: FloatArray) -> None:
         # Written so that a time that is not a number is outside as well.
@@ -328,24 +321,30 @@ class HybridArc:
                 f"which covers [{self.t[0]:g}, {self.t[-1]:g}] s."
             )
 
-    def _flow_at(self, t: float, before: bool) -> FlowRecord:
-        at = bisect.bisect_left(self._ends, t) if before else bisect.bisect_right(self._starts, t) - 1
-        return self._flows[min(max(at, 0), len(self._flows) - 1)]
+    def _numbers_at(self, times: FloatArray, before: bool) -> npt.NDArray[np.int64]:
+        if before:
+            at = np.searchsorted(self._ends, times, side="left")
+        else:
+            at = np.searchsorted(self._starts, times, side="right") - 1
+        return np.clip(at, 0, len(self._flows) - 1)
 
-    def _flow_on(self, t: float, j: Any) -> FlowRecord:
-        flow = self._flow_of(j)
-        if not flow.t0 <= t <= flow.t1:
+    def _number_on(self, t: float, j: Any) -> int:
+        number = self._number_of(j)
+        if not self._starts[number] <= t <= self._ends[number]:
             raise DeclarationError(
                 f"hybrid time (t, j) = ({t:.9g} s, {j}) lies outside the run: at j = {j} it covers "
-                f"[{flow.t0:.9g}, {flow.t1:.9g}] s."
+                f"[{self._starts[number]:.9g}, {self._ends[number]:.9g}] s."
             )
-        return flow
+        return number
 
     def _flow_of(self, j: Any) -> FlowRecord:
+        return self._flows[self._number_of(j)]
+
+    def _number_of(self, j: Any) -> int:
         number = j - self._record.first_j
         if not 0 <= number < len(self._flows) or number != int(number):
             raise DeclarationError(f"the run has no jump count j = {j}: it covers {self.j[0]} to {self.j[-1]}.")
-        return self._flows[int(number)]
+        return int(number)
 
 
 def load_arc(path: str | Path) -> HybridArc:

@@ -94,6 +94,28 @@ class ArcValues(ABC):
             vector = self.inputs(t, x, z) if kind is Kind.INPUT else self.outputs(t, x, z)
         return np.asarray(self._places[name].take(vector), dtype=np.float64)
 
+    def column(self, name: str, t: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return one variable's values at points, shape (points, *shape): t has an element for each, x and z a row."""
+        kind, place = self.variable(name).kind, self._places[name]
+        if kind is Kind.STATE:
+            table = self.states(x)
+        elif kind is Kind.DISCRETE:
+            table = z
+        elif kind is Kind.OUTPUT:
+            table = self.outputs_along(t, x, z)
+        else:
+            rows = [self.parameters(float(s)) for s in t] if kind is Kind.PARAMETER else self._inputs_along(t, x, z)
+            table = np.array(rows).reshape(len(t), self.layout.sizes[kind])
+        return np.array(table[:, place.at], dtype=np.float64).reshape(len(t), *place.variable.shape)
+
+    def outputs_along(self, t: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return the output vectors at points, one row each."""
+        rows = [self.outputs(float(s), *point) for s, *point in zip(t, x, z, strict=True)]
+        return np.array(rows).reshape(len(t), self.layout.sizes[Kind.OUTPUT])
+
+    def _inputs_along(self, t: FloatArray, x: FloatArray, z: FloatArray) -> list[FloatArray]:
+        return [self.inputs(float(s), *point) for s, *point in zip(t, x, z, strict=True)]
+
     def channels(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """Return states, inputs and outputs in one vector."""
         return np.concatenate([self.states(x), self.inputs(t, x, z), self.outputs(t, x, z)])
@@ -202,7 +224,7 @@ class LoadedValues(ArcValues):
 
     def states(self, x: FloatArray) -> FloatArray:
         """See `ArcValues.states`."""
-        return x[: self.layout.sizes[Kind.STATE]]
+        return x[..., : self.layout.sizes[Kind.STATE]]
 
     def inputs(self, t: float, x: FloatArray, z: FloatArray) -> FloatArray:
         """See `ArcValues.inputs`."""

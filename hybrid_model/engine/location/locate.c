@@ -58,7 +58,8 @@ static FlowEnd move_to(Search *search, double t)
 {
     Engine *engine = search->engine;
     const Point *point = search->point;
-    if (!engine_step_probe(engine, point, t))
+    if (!engine_step_probe(engine, point, t) ||
+        (point == &engine->live && !engine_record_step(engine, t, engine->probe_x)))
         return FLOW_PROBLEM;
     *point->time = t;
     *point->step = 0.0;
@@ -200,9 +201,13 @@ bool engine_reach_guard(Engine *engine, const Point *point, double limit)
     }
     if (nearest == m->n_margins)
         return false;
-    *point->time = fmax(t + wait, nextafter(t, INFINITY));
+    double end = fmax(t + wait, nextafter(t, INFINITY));
     for (size_t i = 0; i < m->n_states; i++)
-        point->x[i] += (*point->time - t) * rates[i];
+        engine->probe_x[i] = point->x[i] + (end - t) * rates[i];
+    if (point == &engine->live && !engine_record_line(engine, end, engine->probe_x))
+        return false;
+    *point->time = end;
+    engine_copy(point->x, engine->probe_x, m->n_states);
     *point->step = 0.0;
     engine_note_sizes(engine, point);
     if (!engine_evaluate_margins(engine, *point->time, point->x, point->z))

@@ -1,0 +1,48 @@
+/* What a method of integration does with a step; the control of its length is the same for all, in integrate.c. */
+#ifndef HYBRID_METHOD_H
+#define HYBRID_METHOD_H
+
+#include "parts.h"
+
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
+
+/* Of an interpolation that meets the step at both ends: x0 + a (c + b (d0 + a (d1 + b d2))) with a from 0 to 1 on the
+   step and b = 1 - a, after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I", II.6. */
+#define NESTED_VECTORS 5
+
+/* engine->step goes from (t0, x0), where its rates are in k[0].  The vectors of an interpolation lie one after the
+   other, each of n_states numbers. */
+struct Method {
+    size_t n_vectors;         /* of its interpolation */
+    double order;             /* the error of a step of h falls like h to this power */
+    /* Makes the step to step->t1: the state there in step->x1, the rates there in step->k[N_STAGES - 1], and the error
+       in units of the tolerance (engine_error_scale), infinite where anything is not finite, with the state that is to
+       blame in engine->suspect.  False if a map cannot be evaluated. */
+    bool (*trial)(Engine *engine, const Point *point, double *error);
+    /* The state at any time of the accepted step, or a little beyond, into engine->probe_x: as exact as its end. */
+    bool (*probe)(Engine *engine, const Point *point, double t);
+    /* Makes the vectors of the interpolation of the accepted step: step->vectors. */
+    void (*prepare)(Engine *engine);
+    /* Evaluates vectors at the part a of a step, from 0 to 1. */
+    void (*interpolate)(const double *vectors, size_t n_states, double a, double *x);
+    /* The vectors of the straight way from x0 to x1. */
+    void (*straight)(const double *x0, const double *x1, size_t n_states, double *vectors);
+};
+
+extern const Method engine_dormand_prince;
+
+/* integrate.c */
+/* The error that is allowed in state i of that size; engine->largest must be there. */
+double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size);
+
+/* dense.c */
+void engine_interpolate_nested(const double *vectors, size_t n_states, double a, double *x);
+void engine_straight_nested(const double *x0, const double *x1, size_t n_states, double *vectors);
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
+
+#endif

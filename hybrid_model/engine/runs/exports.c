@@ -1,0 +1,136 @@
+/* What a process that has loaded the engine as a library may call: whole runs of a model, and maps at many points.
+   An FMU does not contain this file. */
+#include <math.h>
+
+#include "parts.h"
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#elif defined(__GNUC__)
+#define EXPORT __attribute__((visibility("default")))
+#else
+#define EXPORT
+#endif
+
+/* Changes with every change of what follows, so that no process uses a library of another version. */
+#define RUN_INTERFACE 1
+
+EXPORT int run_interface(void);
+EXPORT Engine *run_create(const Model *model);
+EXPORT EngineOptions *run_options(Engine *engine);
+EXPORT int run_start(Engine *engine, const double *const values[], double start, double stop, int record);
+EXPORT int run_advance(Engine *engine, double target);
+EXPORT void run_set(Engine *engine, int bank, size_t index, double value);
+EXPORT const double *run_values(Engine *engine, int bank);
+EXPORT const double *run_rows(const Engine *engine, int kind, size_t *count, size_t *width);
+EXPORT const Statistics *run_statistics(const Engine *engine);
+EXPORT int run_ending(const Engine *engine);
+EXPORT double run_time(const Engine *engine);
+EXPORT const char *run_message(const Engine *engine);
+EXPORT void run_free(Engine *engine);
+EXPORT size_t run_evaluate(Engine *engine, int map, size_t count, const double *const tables[], double *results);
+
+int run_interface(void)
+{
+    return RUN_INTERFACE;
+}
+
+Engine *run_create(const Model *model)
+{
+    return engine_create(model, 0);
+}
+
+EngineOptions *run_options(Engine *engine)
+{
+    return engine_options(engine);
+}
+
+/* The reason noted last ends the run. */
+static int fail(Engine *engine)
+{
+    engine_end_run(engine);
+    return 0;
+}
+
+/* Begins a run with values of the states, inputs and parameters, in the order of the banks. */
+int run_start(Engine *engine, const double *const values[], double start, double stop, int record)
+{
+    const Model *m = engine->model;
+    engine_copy(engine->live.x, values[BANK_STATE], m->n_states);
+    engine_copy(engine->live.z, values[BANK_DISCRETE], m->n_discrete);
+    engine_copy(engine->u, values[BANK_INPUT], m->n_inputs);
+    engine_copy(engine->p, values[BANK_PARAMETER], m->n_parameters);
+    engine_set_span(engine, start, stop);
+    engine_record(engine, (RecordKind)record);
+    return engine_start(engine) || fail(engine);
+}
+
+/* Goes on to the target; the jumps that are due there are taken.  A run that has come there may stay: in neither set
+   it is over (line 4 of docs/semantics.md). */
+int run_advance(Engine *engine, double target)
+{
+    double level;
+    Advance advance = engine_advance(engine, target, EVENTS_INSIDE);
+    if (advance != ADVANCE_REACHED || engine_flow_may_begin(engine, &engine->live, &level))
+        return (int)advance;
+    engine_end_run(engine);
+    return (int)ADVANCE_ENDED;
+}
+
+void run_set(Engine *engine, int bank, size_t index, double value)
+{
+    engine_set(engine, (Bank)bank, index, value);
+}
+
+const double *run_values(Engine *engine, int bank)
+{
+    return engine_values(engine, VIEW_LIVE, (Bank)bank);
+}
+
+const double *run_rows(const Engine *engine, int kind, size_t *count, size_t *width)
+{
+    return engine_rows(engine, (RowKind)kind, count, width);
+}
+
+const Statistics *run_statistics(const Engine *engine)
+{
+    return engine_statistics(engine);
+}
+
+int run_ending(const Engine *engine)
+{
+    return (int)engine->status->ending;
+}
+
+double run_time(const Engine *engine)
+{
+    return engine_time(engine);
+}
+
+const char *run_message(const Engine *engine)
+{
+    return engine_message(engine);
+}
+
+void run_free(Engine *engine)
+{
+    engine_free(engine);
+}
+
+/* Evaluates a map of the model (0: rates, 1: outputs, 2: margins) row by row: of t, x, z, u, p there is one row each a
+   point.  Returns how many rows were evaluated: fewer than asked for where one fails. */
+size_t run_evaluate(Engine *engine, int map, size_t count, const double *const tables[], double *results)
+{
+    const Model *m = engine->model;
+    ModelFunction function = map == 0 ? m->flow : map == 1 ? m->outputs : m->margins;
+    size_t widths[MODEL_N_ARG] = {1, m->n_states, m->n_discrete, m->n_inputs, m->n_parameters};
+    size_t width = map == 0 ? m->n_states : map == 1 ? m->n_outputs : m->n_margins;
+    for (size_t row = 0; row < count; row++) {
+        for (size_t i = 0; i < MODEL_N_ARG; i++)
+            engine->arg[i] = tables[i] + row * widths[i];
+        engine->res[0] = results + row * width;
+        if (function(engine->arg, engine->res, engine->iw, engine->w, 0) != 0)
+            return row;
+    }
+    return count;
+}

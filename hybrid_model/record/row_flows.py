@@ -1,0 +1,215 @@
+"""The flows and jumps of a run as flat arrays, as the engine in C leaves them (hybrid_model/engine/recorder.c).
+
+No object is made for a step or a jump before somebody asks for it.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import overload
+
+import numpy as np
+import numpy.typing as npt
+
+from hybrid_model.declare.variables import FloatArray
+from hybrid_model.record.flow_piece import FlowPiece
+from hybrid_model.record.flow_record import FlowRecord
+from hybrid_model.record.jump_record import JumpRecord
+
+Counts = npt.NDArray[np.int64]
+
+_BEFORE_STATES = 3
+"""Numbers in a row before those of the states."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What the engine has recorded of a run.
+
+    Attributes
+    ----------
+    steps : ndarray, shape (steps, 3 + (1 + vectors) * states)
+        The ends t0 and t1 of each step in s, where it was cut, the states there, and the vectors of its interpolation.
+    jumps : ndarray, shape (1 + jumps, 3 + 2 * (states + discrete states))
+        The number of steps before each jump, its time in s, its index, and the states before and after it. The first
+        row is the start.
+    states, discrete : int
+        Numbers of scalar states.
+    names : tuple of str
+        Of the automaton's jumps.
+    """
+
+    steps: FloatArray
+    jumps: FloatArray
+    states: int
+    discrete: int
+    names: tuple[str, ...]
+
+    @functools.cached_property
+    def firsts(self) -> Counts:
+        """The number of the first step of each flow, and the number of all steps at the end."""
+        return np.append(self.jumps[:, 0], len(self.steps)).astype(np.int64)
+
+    @property
+    def starts(self) -> FloatArray:
+        """Where each flow starts, in s."""
+        return self.jumps[:, 1]
+
+    @functools.cached_property
+    def ends(self) -> FloatArray:
+        """Where each flow ends, in s."""
+        ends = self.starts.copy()
+        flown = self.firsts[1:] > self.firsts[:-1]
+        ends[flown] = self.steps[self.firsts[1:][flown] - 1, 2]
+        return ends
+
+    @property
+    def begun(self) -> FloatArray:
+        """The states at the start of each flow, shape (flows, states)."""
+        first = _BEFORE_STATES + self.states + self.discrete
+        return self.jumps[:, first : first + self.states]
+
+    @property
+    def held(self) -> FloatArray:
+        """The discrete states in each flow, shape (flows, discrete states)."""
+        return self.jumps[:, _BEFORE_STATES + 2 * self.states + self.discrete :]
+
+    @property
+    def reached(self) -> FloatArray:
+        """The states at the end of each step, shape (steps, states)."""
+        return self.steps[:, _BEFORE_STATES : _BEFORE_STATES + self.states]
+
+    @property
+    def indices(self) -> Counts:
+        """Index of each jump."""
+        return self.jumps[1:, 2].astype(np.int64)
+
+    def vectors(self, step: int | Counts) -> FloatArray:
+        """Return the vectors of the interpolation of a step, shape (vectors, states), or of steps."""
+        given = self.steps[step, _BEFORE_STATES + self.states :]
+        return given.reshape(*given.shape[:-1], -1, self.states)
+
+    def at(self, flows: Counts, times: FloatArray) -> FloatArray:
+        """Return the states in flows at times in them, shape (times, states)."""
+        states = self.begun[flows]
+        inside = times > self.starts[flows]
+        if not inside.any():
+            return states
+        k, t = flows[inside], times[inside]
+        # A flow's steps lie in order: count those that end before the time, as far back as the flow goes.
+        step = self._steps_at(k, t)
+        row = self.steps[step]
+        found = nested(self.vectors(step), ((t - row[:, 0]) / (row[:, 1] - row[:, 0]))[:, None])
+        states[inside] = np.where((t >= row[:, 2])[:, None], self.reached[step], found)
+        return states
+
+    def _steps_at(self, flows: Counts, times: FloatArray) -> Counts:
+        """Return the first step of each flow that ends at the time or after it, or the flow's last."""
+        # Ends do not fall from step to step, also from flow to flow.
+        step = np.searchsorted(self.steps[:, 2], times, side="left")
+        return np.clip(step, self.firsts[flows], self.firsts[flows + 1] - 1)
+
+
+def nested(vectors: FloatArray, a: FloatArray | float) -> FloatArray:
+    """Evaluate interpolations at parts of their steps (hybrid_model/engine/dense.c).
+
+    Parameters
+    ----------
+    vectors : ndarray, shape (..., 5, states)
+        The state at the start, its change, and three of its curvature.
+    a : float or ndarray, broadcast against (..., states)
+        From 0 at the start of a step to 1 at its end.
+    """
+    b = 1.0 - a
+    x0, change, d0, d1, d2 = (vectors[..., k, :] for k in range(5))
+    return np.asarray(x0 + a * (change + b * (d0 + a * (d1 + b * d2))))
+
+
+@dataclass(frozen=True, eq=False)
+class _Interpolation:
+    """The dense output of one step."""
+
+    t0: float
+    t1: float
+    vectors: FloatArray
+
+    def __call__(self, t: float | FloatArray) -> FloatArray:
+        part = (np.asarray(t) - self.t0) / (self.t1 - self.t0)
+        return nested(self.vectors, part) if part.ndim == 0 else nested(self.vectors, part[:, None]).T
+
+
+class RowFlows(Sequence[FlowRecord]):
+    """The flows of a run; each is made when it is asked for.
+
+    Parameters
+    ----------
+    rows : Rows
+        What the engine has recorded.
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self.rows = rows
+
+    def __len__(self) -> int:
+        return len(self.rows.jumps)
+
+    @overload
+    def __getitem__(self, k: int) -> FlowRecord: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[FlowRecord]: ...
+    def __getitem__(self, k: int | slice) -> FlowRecord | list[FlowRecord]:
+        if isinstance(k, slice):
+            return [self[i] for i in range(*k.indices(len(self)))]
+        k = range(len(self))[k]
+        rows, x0 = self.rows, self.rows.begun[k]
+        pieces, x = list[FlowPiece](), x0
+        for step in range(rows.firsts[k], rows.firsts[k + 1]):
+            t0, t1, end = (float(t) for t in rows.steps[step, :_BEFORE_STATES])
+            reached = rows.reached[step]
+            pieces.append(FlowPiece(t0, end, x, reached, _Interpolation(t0, t1, rows.vectors(step))))
+            x = reached
+        return FlowRecord(float(rows.starts[k]), x0, rows.held[k], tuple(pieces))
+
+    def __iter__(self) -> Iterator[FlowRecord]:
+        return (self[k] for k in range(len(self)))
+
+
+class RowJumps(Sequence[JumpRecord]):
+    """The jumps of a run; each is made when it is asked for.
+
+    Parameters
+    ----------
+    rows : Rows
+        What the engine has recorded.
+    """
+
+    def __init__(self, rows: Rows) -> None:
+        self.rows = rows
+
+    def __len__(self) -> int:
+        return len(self.rows.jumps) - 1
+
+    @overload
+    def __getitem__(self, k: int) -> JumpRecord: ...
+    @overload
+    def __getitem__(self, k: slice) -> list[JumpRecord]: ...
+    def __getitem__(self, k: int | slice) -> JumpRecord | list[JumpRecord]:
+        if isinstance(k, slice):
+            return [self[i] for i in range(*k.indices(len(self)))]
+        k = range(len(self))[k]
+        row, rows = self.rows.jumps[k + 1], self.rows
+        ends = np.cumsum([_BEFORE_STATES, rows.states, rows.discrete, rows.states])
+        x_before, z_before, x_after, z_after = np.split(row, ends)[1:]
+        index = int(row[2])
+        return JumpRecord(float(row[1]), k, index, rows.names[index], x_before, z_before, x_after, z_after)
+
+    def __iter__(self) -> Iterator[JumpRecord]:
+        return (self[k] for k in range(len(self)))
+
+    def times(self, name: str) -> FloatArray:
+        """Return the times in s of the jumps called `name`."""
+        wanted = np.array([known == name for known in self.rows.names], dtype=bool)
+        times: FloatArray = self.rows.jumps[1:, 1][wanted[self.rows.indices]]
+        return times
