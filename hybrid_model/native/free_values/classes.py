@@ -1,0 +1,105 @@
+"""What classes and their instances hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import ClassMethodDescriptorType, GetSetDescriptorType, MethodDescriptorType, WrapperDescriptorType
+from typing import Any
+
+import numpy as np
+
+from hybrid_model.declare.transitions import Clock
+from hybrid_model.declare.variables import ClassAttribute
+from hybrid_model.native.free_values import known
+from hybrid_model.native.free_values.containers import CONTAINERS, content, items_of
+from hybrid_model.native.free_values.reading import Reading, UntoldError
+from hybrid_model.native.free_values.watch import MISSING, slots_of
+
+_BODY_ONLY = frozenset(
+    {"__module__", "__doc__", "__dict__", "__weakref__", "__slots__", "__annotations__", "__qualname__", "_abc_impl"}
+    | {"__orig_bases__", "__parameters__", "__abstractmethods__", "__dataclass_fields__", "__dataclass_params__"}
+    | {"__firstlineno__", "__static_attributes__", "__annotate__", "__annotate_func__", "__annotations_cache__"}
+    | {"__classdictcell__"}
+)
+"""What Python keeps in a class for itself."""
+_MAKING = frozenset(("__init__", "__new__", "__post_init__", "__init_subclass__", "__set_name__", "__class_getitem__"))
+"""What runs when an instance or a subclass is made."""
+_SIMPLE = (int, float, complex, str, bytes)
+_ROOTS = (object, *CONTAINERS, np.ndarray, *_SIMPLE, BaseException, type)
+_MADE_AT_RUN_TIME = 1 << 9
+_OF_C = (WrapperDescriptorType, MethodDescriptorType, ClassMethodDescriptorType, GetSetDescriptorType)
+
+
+def describe_class(reading: Reading, number: int, cls: type) -> None:
+    """Describe a class: its bases, and those of its attributes that code can read."""
+    if known.is_known(cls):
+        reading.known_code(cls)
+        reading.record(number, "known class", cls.__module__, cls.__qualname__)
+        return
+    if not _is_of_python(cls):
+        raise UntoldError(f"a map reads the class {cls.__module__}.{cls.__qualname__}")
+    reading.watch.of_class(cls)
+    bases = map(reading.reference, cls.__mro__[1:])
+    reading.record(number, "class", cls.__name__, reading.reference(type(cls)), *bases)
+    everything = known.has_reading_base(cls)
+    making: list[tuple[str, object]] = []
+    for name, held in vars(cls).items():
+        if name in _BODY_ONLY:
+            continue
+        if name in _MAKING or isinstance(held, ClassAttribute | Clock):
+            making.append((name, held))
+        else:
+            # Operators and the like are read without a name.
+            reading.attribute(number, name, held, read=everything or name.startswith("__"))
+    reading.making(number, cls, making)
+    for word in vars(cls).get("__match_args__", ()):
+        reading.word(word)
+
+
+def describe_instance(reading: Reading, number: int, value: Any) -> None:
+    """Describe an object: its class, what it holds as a container, and those of its attributes that code can read."""
+    cls = type(value)
+    if not _is_plain(cls):
+        raise UntoldError(f"a map reads a value of the class {cls.__module__}.{cls.__qualname__}")
+    reading.watch.instance(value)
+    reading.record(number, "instance", reading.reference(cls), *_content_of(reading, value))
+    slots = slots_of(value)
+    if slots:
+        reading.watch.content(slots_of, value)
+        reading.record(number, "slots", *[("missing",) if item is MISSING else reading.token(item) for item in slots])
+    attributes = getattr(value, "__dict__", None)
+    everything = known.has_reading_base(cls)
+    for name, item in (attributes if isinstance(attributes, dict) else {}).items():
+        reading.attribute(number, name, item, read=everything)
+
+
+def _content_of(reading: Reading, value: Any) -> list[object]:
+    """Return tokens of what an instance of a subclass holds as a container, array, number or text."""
+    for kind, items in CONTAINERS.items():
+        if isinstance(value, kind):
+            return [kind.__name__, *items_of(reading, items, value)]
+    if isinstance(value, np.ndarray):
+        return content(reading, value)
+    simple: Callable[[Any], str] | None = next((kind.__repr__ for kind in _SIMPLE if isinstance(value, kind)), None)
+    return [] if simple is None else [simple(value)]
+
+
+def _is_plain(cls: type) -> bool:
+    """Whether all state of an instance is in its attributes and in what containers of Python hold."""
+    while cls not in _ROOTS:
+        if not _is_of_python(cls):
+            return False
+        cls = cls.__base__ or object
+    return True
+
+
+def _is_of_python(cls: type) -> bool:
+    """Whether a class was written in Python: those written in C have methods in C, and room for state of their own."""
+    if not cls.__flags__ & _MADE_AT_RUN_TIME:
+        return False
+    body = vars(cls)
+    own = [name for name, held in body.items() if isinstance(held, _OF_C) and held.__objclass__ is cls]
+    slots = body.get("__slots__", ())
+    room = 8 * (2 + (1 if isinstance(slots, str) else len(slots)))
+    base = cls.__base__ or object
+    return set(own) <= {"__dict__", "__weakref__"} and cls.__basicsize__ - base.__basicsize__ <= room

@@ -1,0 +1,94 @@
+"""What compiled code names: the globals that it looks up, and every word that could be the name of an attribute.
+
+What code can reach from outside its arguments it must name somewhere, unless it computes names. Constant texts that are
+names count too: ``getattr(self, "gain")`` and ``"{0.gain}".format(self)`` read attributes without an instruction of
+their own.
+"""
+
+from __future__ import annotations
+
+import dis
+import itertools
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from types import CodeType
+from weakref import WeakKeyDictionary
+
+_NAMES = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
+_FIELD = re.compile(r"\{([^{}]*)\}")
+_WORD = re.compile(r"[^\W\d]\w*")
+_FOLLOWED = ("LOAD_ATTR", "LOAD_METHOD")
+_SILENT = ("PUSH_NULL", "CACHE", "EXTENDED_ARG")
+
+
+@dataclass(frozen=True, eq=False)
+class CodeNames:
+    """What a code object names, code of nested functions included.
+
+    Attributes
+    ----------
+    token : int
+        Equal for equal code, and for no other as long as the process lives.
+    lookups : mapping
+        Name of a global -> names of the attributes that are taken from it at once; None if it is also used otherwise.
+    words : tuple of str
+        All that could be the name of an attribute, each once.
+    imports : tuple of str
+        Modules that the code itself imports; with leading dots where the import is relative.
+    """
+
+    token: int
+    lookups: dict[str, frozenset[str] | None]
+    words: tuple[str, ...]
+    imports: tuple[str, ...]
+
+
+_known: WeakKeyDictionary[CodeType, CodeNames] = WeakKeyDictionary()
+_tokens = itertools.count()
+
+
+def code_names(code: CodeType) -> CodeNames:
+    """Return what a code object names; it is looked at once."""
+    found = _known.get(code)
+    if found is None:
+        found = _known[code] = _looked_at(code)
+    return found
+
+
+def _looked_at(code: CodeType) -> CodeNames:
+    lookups: dict[str, frozenset[str] | None] = {}
+    words: dict[str, None] = {}
+    imports: dict[str, None] = {}
+    for one in _with_nested(code):
+        words |= dict.fromkeys(one.co_names)
+        instructions = [item for item in dis.get_instructions(one) if item.opname not in _SILENT]
+        for before, item, after in zip([None, *instructions], instructions, [*instructions[1:], None], strict=False):
+            if item.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+                taken = after.argval if after is not None and after.opname in _FOLLOWED else None
+                known = lookups.get(item.argval, frozenset())
+                lookups[item.argval] = None if known is None or taken is None else known | {taken}
+            elif item.opname == "IMPORT_NAME":
+                # The level of the import lies below the list of names on the stack.
+                index = instructions.index(item)
+                level = instructions[index - 2].argval if before is not None and index > 1 else 0
+                imports["." * (level if isinstance(level, int) else 1) + item.argval] = None
+            elif item.opcode in dis.hasconst:
+                words |= dict.fromkeys(_words(item.argval))
+    return CodeNames(next(_tokens), lookups, tuple(words), tuple(imports))
+
+
+def _with_nested(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _with_nested(constant)
+
+
+def _words(constant: object) -> Iterator[str]:
+    if isinstance(constant, str):
+        for text in [constant] if _NAMES.fullmatch(constant) else _FIELD.findall(constant):
+            yield from _WORD.findall(text)
+    elif isinstance(constant, tuple | frozenset):
+        for item in constant:
+            yield from _words(item)

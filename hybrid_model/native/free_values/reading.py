@@ -1,0 +1,277 @@
+"""What has been read so far: numbers for objects, records of what they hold, and the words that code names.
+
+The description of an automaton is a list of records in an order that follows from what is met alone. So two automata
+have equal descriptions only if what their maps can read is equal and hangs together in the same way. An attribute of an
+object, a class or a module counts as read if its name stands anywhere in the code that can run; until some code names
+it, it waits.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections import deque
+from collections.abc import Iterable
+from types import CodeType, ModuleType
+from typing import Any
+
+from hybrid_model.native.free_values import known
+from hybrid_model.native.free_values.code_names import code_names
+from hybrid_model.native.free_values.watch import MISSING, Watch
+
+_LEAVES = frozenset((type(None), bool, int, float, complex, str, bytes, type(Ellipsis), type(NotImplemented), range))
+"""Types whose values say all about themselves."""
+_VALUES_READ = ("variables", "of_kind", "__dict__")
+"""Words by which a map gets at start values, which are data otherwise."""
+_TAKING_NAMES = ("__dict__", "__getattribute__", "attrgetter", "methodcaller")
+"""Words by which code gets at attributes that it does not name."""
+_ITS_CLASS = "__class__"
+
+
+class UntoldError(Exception):
+    """A map reads something whose state cannot be compared; the message is the end of a sentence."""
+
+
+class Reading:
+    """What the maps of an automaton have been found to read.
+
+    Attributes
+    ----------
+    records : list
+        The description so far: numbers, texts and tuples of them.
+    watch : Watch
+        What it was made of.
+    open : deque
+        Objects that have a number and are still to be described.
+    start_values : bool
+        Whether maps get at start values by the declarations.
+    """
+
+    def __init__(self) -> None:
+        self.records: list[object] = []
+        self.watch = Watch()
+        self.open: deque[object] = deque()
+        self.start_values = False
+        self._numbers: dict[int, int] = {}
+        self._held: list[object] = []
+        self._words: set[str] = set(known.framework_words())
+        self._own_words: set[str] = set()
+        self._every_word = self._bare_arrays = False
+        self._waiting: dict[str, list[tuple[int, object]]] = {}
+        self._modules: list[ModuleType] = []
+        self._resolved: set[tuple[int, str]] = set()
+        self._making: dict[int, list[tuple[int, str, object]]] = {}
+        self._made: set[int] = set()
+
+    @property
+    def size(self) -> int:
+        """Number of the objects met."""
+        return len(self._held)
+
+    # Values in records.
+
+    def record(self, number: int, *tokens: object) -> None:
+        """Add to the description of the object with a number."""
+        self.records.append((number, *tokens))
+
+    def token(self, value: object) -> object:
+        """Return what stands for a value in a record."""
+        kind = type(value)
+        if kind in _LEAVES:
+            return value
+        if isinstance(value, tuple) and kind is tuple:
+            return ("tuple", *map(self.token, value))
+        if isinstance(value, type):
+            self._make(value)
+        return self.reference(value)
+
+    def tokens(self, values: Iterable[object]) -> list[object]:
+        """Return what stands for several values."""
+        return list(map(self.token, values))
+
+    def reference(self, value: object) -> tuple[int]:
+        """Return the number of an object, in a tuple, and remember to describe it."""
+        number = self._numbers.get(id(value))
+        if number is None:
+            number = self._numbers[id(value)] = len(self._numbers)
+            self._held.append(value)
+            self.open.append(value)
+        return (number,)
+
+    def number(self, value: object) -> int:
+        """Return the number of an object that has one."""
+        return self._numbers[id(value)]
+
+    # Attributes and words.
+
+    def attribute(self, owner: int, name: str, value: object, *, read: bool = False) -> None:
+        """Note an attribute; it is described when it is read, or as soon as some code names it."""
+        if read or self._every_word or name in self._words:
+            self.records.append((owner, name, self.token(value)))
+        else:
+            self._waiting.setdefault(name, []).append((owner, value))
+
+    def making(self, owner: int, cls: type, items: list[tuple[str, object]]) -> None:
+        """Note attributes of a class that are read only where code has the class itself, as when it makes instances."""
+        waiting = [(owner, name, value) for name, value in items]
+        self._making[id(cls)] = waiting
+        if id(cls) in self._made or _ITS_CLASS in self._own_words:
+            self._read_making(id(cls))
+
+    def word(self, word: str) -> None:
+        """Some code names a word."""
+        if word in self._own_words:
+            return
+        self._own_words.add(word)
+        if word in _VALUES_READ:
+            self.start_values = True
+        if word in _TAKING_NAMES:
+            self.every_word()
+        if word == _ITS_CLASS:
+            for cls in list(self._making):
+                self._read_making(cls)
+        if word not in self._words:
+            self._words.add(word)
+            for owner, value in self._waiting.pop(word, ()):
+                self.records.append((owner, word, self.token(value)))
+            for module in self._modules:
+                self._attribute_of_module(module, word)
+
+    def every_word(self) -> None:
+        """Some code computes names: every attribute may be meant."""
+        if self._every_word:
+            return
+        self._every_word = self.start_values = True
+        self.word(_ITS_CLASS)
+        self._refuse_modules()
+        waiting, self._waiting = self._waiting, {}
+        for name, items in waiting.items():
+            for owner, value in items:
+                self.records.append((owner, name, self.token(value)))
+
+    def known_code(self, value: object) -> None:
+        """Note what a function or class that is not looked at may read."""
+        if known.reads_start_values(value):
+            self.start_values = True
+        if known.takes_apart(value):
+            self.every_word()
+
+    def _make(self, cls: type) -> None:
+        for base in cls.__mro__:
+            if id(base) not in self._made:
+                self._made.add(id(base))
+                self._read_making(id(base))
+
+    def _read_making(self, cls: int) -> None:
+        for owner, name, value in self._making.pop(cls, ()):
+            self.records.append((owner, name, self.token(value)))
+
+    # Code and modules.
+
+    def code(self, code: CodeType, where: dict[str, Any]) -> None:
+        """Follow what code names, with the globals that it was made with."""
+        names = code_names(code)
+        for word in names.words:
+            self.word(word)
+        for name, taken in names.lookups.items():
+            self._look_up(where, name, taken)
+        for name in names.imports:
+            self._import(name, where)
+
+    def module(self, number: int, module: ModuleType) -> None:
+        """Describe a module that code uses otherwise than by naming one of its attributes."""
+        name = module.__name__
+        self.record(number, "module", name)
+        if known.is_known_module(name):
+            self.known_code(module)
+            self._bare_arrays = self._bare_arrays or known.is_of_arrays(name)
+            return
+        if known.is_of_library(name):
+            raise UntoldError(f"a map reads the module {name}")
+        self._modules.append(module)
+        self._refuse_modules()
+        for word in [word for word in vars(module) if word in self._words]:
+            self._attribute_of_module(module, word)
+
+    def close(self) -> None:
+        """Watch names of modules that do not exist yet; refuse what is known at the end only."""
+        if self._bare_arrays and not self._own_words.isdisjoint(known.OUTSIDE):
+            raise UntoldError("a map may read random numbers or a file by numpy")
+        for module in self._modules:
+            self.watch.names(vars(module), sorted(self._words))
+        self.watch.close()
+
+    def _look_up(self, where: dict[str, Any], name: str, taken: frozenset[str] | None) -> None:
+        value = where.get(name, MISSING)
+        found = where
+        if value is MISSING:
+            found = _builtins(where)
+            value = found.get(name, MISSING)
+            self._refuse_builtin(name)
+        attributes = sorted(taken) if taken is not None and isinstance(value, ModuleType) else None
+        if (id(where), name) not in self._resolved:
+            self._resolved.add((id(where), name))
+            self.watch.names(where, (name,))
+            if found is not where:
+                self.watch.names(found, (name,))
+            shown = ("missing",) if value is MISSING else _shown(value, attributes) or self.token(value)
+            self.records.append(("global", self._number_of(where), name, shown))
+        elif value is not MISSING and attributes is None:
+            self.token(value)
+        if isinstance(value, ModuleType):
+            for attribute in attributes or ():
+                self._attribute_of_module(value, attribute)
+
+    def _refuse_builtin(self, name: str) -> None:
+        if name in known.UNTOLD_BUILTINS:
+            raise UntoldError(f"a map calls {name}()")
+        if name == "type":
+            self.word(_ITS_CLASS)
+
+    def _refuse_modules(self) -> None:
+        if self._every_word and self._modules:
+            raise UntoldError(f"a map computes names, and reads the module {self._modules[0].__name__}")
+
+    def _attribute_of_module(self, module: ModuleType, name: str) -> None:
+        here = vars(module)
+        if known.is_known_module(module.__name__):
+            if known.is_of_arrays(module.__name__) and name in known.OUTSIDE:
+                raise UntoldError(f"a map reads {module.__name__}.{name}")
+            self.known_code(here.get(name))
+            if not isinstance(here.get(name), ModuleType):
+                return
+        if (id(here), name) in self._resolved:
+            return
+        self._resolved.add((id(here), name))
+        self.watch.names(here, (name,))
+        # A module may make what is asked for.
+        found = name if name in here else "__getattr__"
+        if found in here:
+            self.records.append(("of module", self._number_of(here), name, found, self.token(here[found])))
+
+    def _import(self, name: str, where: dict[str, Any]) -> None:
+        try:
+            name = importlib.util.resolve_name(name, where.get("__package__")) if name.startswith(".") else name
+        except ImportError as error:
+            raise UntoldError(f"a map imports {name}") from error
+        path = name.split(".")
+        for end in range(1, len(path) + 1):
+            module = sys.modules.get(".".join(path[:end]))
+            if module is None:
+                raise UntoldError(f"a map imports {name}")
+            self.watch.names(sys.modules, (".".join(path[:end]),))
+            self.records.append(("import", self.token(module)))
+
+    def _number_of(self, names: dict[str, Any]) -> int:
+        self._held.append(names)
+        return self._numbers.setdefault(id(names), len(self._numbers))
+
+
+def _shown(value: object, attributes: list[str] | None) -> object:
+    """What stands for a module of which code takes some attributes only."""
+    return ("module", value.__name__) if attributes is not None and isinstance(value, ModuleType) else None
+
+
+def _builtins(where: dict[str, Any]) -> dict[str, Any]:
+    found = where.get("__builtins__", {})
+    return vars(found) if isinstance(found, ModuleType) else found

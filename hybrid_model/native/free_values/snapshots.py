@@ -1,0 +1,89 @@
+"""Snapshots of what the maps of an automaton read besides their argument: whether a kept trace still holds."""
+
+from __future__ import annotations
+
+from hashlib import blake2b
+
+import numpy as np
+
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.variables import Variable
+from hybrid_model.native.free_values.containers import content
+from hybrid_model.native.free_values.objects import describe
+from hybrid_model.native.free_values.reading import Reading, UntoldError
+
+MOST = 50_000
+"""Objects that are looked at; with more, a comparison costs as much as a trace."""
+
+
+class Snapshot:
+    """What the maps of an automaton read besides their argument, as it was when the snapshot was taken.
+
+    It holds what was read, and so the automaton: keep it with the automaton, not in a table. The key holds nothing.
+
+    Attributes
+    ----------
+    key : bytes
+        Two automata with one key have maps that trace to the same expressions of their variables. Start values and
+        values of parameters are not part of it, unless a map gets at them by the declarations.
+    """
+
+    def __init__(self, reading: Reading) -> None:
+        self._watch = reading.watch
+        text = repr(reading.records).encode("utf-8", "surrogatepass")
+        self.key = blake2b(text, digest_size=20).digest()
+
+    def still_holds(self) -> bool:
+        """Whether nothing that was read has changed. In doubt it has: a new snapshot may have the same key."""
+        return self._watch.still_holds()
+
+
+def snapshot(automaton: Automaton) -> Snapshot | None:
+    """Take a snapshot of what the maps of an automaton read besides their argument.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        Whose maps.
+
+    Returns
+    -------
+    Snapshot or None
+        None if it cannot be told what they read: then a trace is good for one run only.
+
+    Notes
+    -----
+    Take it before the trace; if it does not hold after that, the maps change what they read, and the trace is good for
+    one run only.
+    """
+    try:
+        return Snapshot(_reading(automaton))
+    except UntoldError:
+        return None
+
+
+def why_untold(automaton: Automaton) -> str | None:
+    """Return why `snapshot` gives None for an automaton, as the end of a sentence; None if it gives a snapshot."""
+    try:
+        _reading(automaton)
+    except UntoldError as reason:
+        return str(reason)
+    return None
+
+
+def _reading(automaton: Automaton) -> Reading:
+    reading = Reading()
+    reading.records.append(reading.token(automaton))
+    variables: list[Variable] = []
+    while reading.open:
+        if reading.size > MOST:
+            raise UntoldError(f"maps can read more than {MOST} objects")
+        value = reading.open.popleft()
+        describe(reading, value)
+        if isinstance(value, Variable):
+            variables.append(value)
+    if reading.start_values:
+        for variable in variables:
+            reading.record(reading.number(variable), *content(reading, np.asarray(variable.start)))
+    reading.close()
+    return reading

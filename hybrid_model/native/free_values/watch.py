@@ -1,0 +1,130 @@
+"""What was read, beside what it is now: compared by identity, arrays by their content, in as few steps as possible.
+
+Objects that are held here cannot give their identity to others. Nothing that was read is called or compared by a method
+of its own. In doubt something has changed: an equal value in a new object counts as another one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from itertools import chain
+from operator import attrgetter, is_
+from types import CellType, FunctionType, MemberDescriptorType
+from typing import Any
+
+import numpy as np
+
+MISSING = object()
+"""Stands for a name that is not there, and for an empty cell."""
+
+Array = np.ndarray[Any, Any]
+
+_parts_of_function = attrgetter("__code__", "__defaults__", "__kwdefaults__")
+_order_of_bases = attrgetter("__mro__")
+
+
+class Watch:
+    """What a walk has come across, as it was then."""
+
+    def __init__(self) -> None:
+        self._objects: list[object] = []
+        self._dictionaries: list[dict[Any, Any]] = []
+        self._functions: list[FunctionType] = []
+        self._classes: list[type] = []
+        self._cells: list[CellType] = []
+        self._lookups: list[tuple[Mapping[str, Any], tuple[str, ...]]] = []
+        self._contents: list[tuple[Callable[[Any], tuple[Any, ...]], Any]] = []
+        self._arrays: list[tuple[Array, Any, tuple[int, ...], bytes]] = []
+        self._then: tuple[tuple[Any, ...], ...] = ()
+
+    def instance(self, value: object) -> None:
+        """Watch the class of an object and its attributes."""
+        self._objects.append(value)
+        attributes = getattr(value, "__dict__", None)
+        if isinstance(attributes, dict):
+            self._dictionaries.append(attributes)
+
+    def dictionary(self, value: dict[Any, Any]) -> None:
+        """Watch the keys and values of a dictionary, in order."""
+        self._dictionaries.append(value)
+
+    def content(self, read: Callable[[Any], tuple[Any, ...]], value: object) -> None:
+        """Watch what a function of ours reads from a value."""
+        self._contents.append((read, value))
+
+    def array(self, value: Array) -> None:
+        """Watch the content of an array of numbers."""
+        self._arrays.append((value, value.dtype, value.shape, value.tobytes()))
+
+    def function(self, value: FunctionType) -> None:
+        """Watch the code of a function, its defaults and its attributes."""
+        self._functions.append(value)
+        self._dictionaries.append(vars(value))
+
+    def of_class(self, value: type) -> None:
+        """Watch all attributes of a class, and its bases."""
+        self._classes.append(value)
+
+    def cell(self, value: CellType) -> None:
+        """Watch a variable of an enclosing function."""
+        self._cells.append(value)
+
+    def names(self, where: Mapping[str, Any], names: Iterable[str]) -> None:
+        """Watch what names stand for in a dictionary, such as that of a module."""
+        self._lookups.append((where, tuple(names)))
+
+    def close(self) -> None:
+        """Note what everything is now."""
+        self._then = self._now()
+
+    def still_holds(self) -> bool:
+        """Whether everything is what it was."""
+        now = self._now()
+        return all(
+            len(values) == len(before) and all(map(is_, values, before))
+            for values, before in zip(now, self._then, strict=True)
+        ) and all(_is_content(*array) for array in self._arrays)
+
+    def _now(self) -> tuple[tuple[Any, ...], ...]:
+        bodies = [vars(cls) for cls in self._classes]
+        # Lengths as well: what one dictionary has lost, the next may have won.
+        return (
+            tuple(map(type, self._objects)),
+            tuple(map(dict.__len__, self._dictionaries)),
+            tuple(chain.from_iterable(map(dict.__iter__, self._dictionaries))),
+            tuple(chain.from_iterable(map(dict.values, self._dictionaries))),
+            tuple(map(_order_of_bases, self._classes)),
+            tuple(map(len, bodies)),
+            tuple(chain.from_iterable(bodies)),
+            tuple(chain.from_iterable([body.values() for body in bodies])),
+            tuple(chain.from_iterable(map(_parts_of_function, self._functions))),
+            tuple(map(_content_of_cell, self._cells)),
+            tuple([where.get(name, MISSING) for where, names in self._lookups for name in names]),
+            *[read(value) for read, value in self._contents],
+        )
+
+
+def _is_content(array: Array, dtype: Any, shape: tuple[int, ...], content: bytes) -> bool:
+    return array.shape == shape and array.dtype == dtype and array.tobytes() == content
+
+
+def _content_of_cell(cell: CellType) -> Any:
+    try:
+        return cell.cell_contents
+    except ValueError:
+        return MISSING
+
+
+def slots_of(value: object) -> tuple[Any, ...]:
+    """Return the attributes of an object that are in no dictionary, base classes last."""
+    found = []
+    for body in map(vars, type(value).__mro__):
+        if "__slots__" not in body:
+            continue
+        for descriptor in body.values():
+            if type(descriptor) is MemberDescriptorType:
+                try:
+                    found.append(descriptor.__get__(value))
+                except AttributeError:
+                    found.append(MISSING)
+    return tuple(found)
