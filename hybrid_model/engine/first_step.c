@@ -56,13 +56,12 @@ bool engine_raise_floor(Engine *engine, const Point *point, double limit)
 
 /* An Euler step shows how the derivative changes; the step is chosen so that its error is about the tolerance.  Only
    ratios occur, so that no unit matters: see hybrid_model/reference/first_step.py. */
-bool engine_first_step(Engine *engine, const Point *point, double limit, double *h)
+bool engine_first_step(Engine *engine, const Point *point, double limit, double size, double *h)
 {
     const ModelScales *scales = &engine->model->scales;
     Step *step = &engine->step;
     size_t n = engine->model->n_states;
     double t = *point->time, whole = limit - t, speed = largest_of(n, step->k[0], NULL);
-    double size = n > 0 ? engine_largest_state(engine, point, point->x) : 0.0;
     bool known = size > DBL_MIN / scales->absolute;
     double least =
         fmin(whole, scales->first_least * fmax(engine_time_ulp(t), isfinite(limit) ? engine_time_ulp(limit) : 0.0));

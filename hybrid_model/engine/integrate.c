@@ -77,7 +77,7 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
     const Method *method = engine->method;
     double t0 = *point->time, remaining = limit - t0, h = *point->step;
     bool rejected = false;
-    if (h <= 0.0 && !engine_first_step(engine, point, limit, &h))
+    if (h <= 0.0 && !engine_first_step(engine, point, limit, engine_largest_state(engine, point, point->x), &h))
         return false;
     h = fmin(h, engine->options.longest_step);
     for (;;) {
@@ -102,7 +102,7 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
             continue;
         if (!isfinite(error) || !engine_raise_floor(engine, point, limit))
             return step_too_small(engine, point, h, isfinite(error));
-        if (!engine_first_step(engine, point, limit, &h))
+        if (!engine_first_step(engine, point, limit, engine_largest_state(engine, point, point->x), &h))
             return false;
     }
 }

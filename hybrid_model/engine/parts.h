@@ -182,8 +182,9 @@ void engine_clear_levels(const Engine *engine, const Point *point);
 void engine_changed(Engine *engine);
 
 /* first_step.c */
-/* The length of a first step from the point towards `limit`; engine_step_begin comes before. */
-bool engine_first_step(Engine *engine, const Point *point, double limit, double *h);
+/* The length of a first step from the point towards `limit`, for states as large as `size`; engine_step_begin comes
+   before. */
+bool engine_first_step(Engine *engine, const Point *point, double limit, double size, double *h);
 /* Gives states that are far below where a flow to `limit` may lead a size of that; whether they got one.
    engine_step_begin comes before. */
 bool engine_raise_floor(Engine *engine, const Point *point, double limit);

@@ -17,8 +17,9 @@ static size_t look_ahead_steps(const Engine *engine)
 /* How far a look ahead goes that has no limit: far beyond all that the run has shown of its time scale. */
 static double look_ahead_limit(Engine *engine)
 {
-    double step, now = *engine->live.time, span = fabs(now);
-    if (engine_step_begin(engine, &engine->live) && engine_first_step(engine, &engine->live, INFINITY, &step))
+    const Point *live = &engine->live;
+    double step, now = *live->time, span = fabs(now), size = engine_largest_state(engine, live, live->x);
+    if (engine_step_begin(engine, live) && engine_first_step(engine, live, INFINITY, size, &step))
         span = fmax(span, step);
     span *= LOOK_AHEAD_TIMES;
     if (engine_evaluate_times(engine, &engine->live)) {

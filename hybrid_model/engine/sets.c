@@ -126,24 +126,31 @@ static bool margin_change(Engine *engine, const Point *point, double margin, dou
     return true;
 }
 
-static double largest_shown(const Engine *engine, const Point *point)
+/* The largest size of the states, and whether the run or a nominal value has shown it; else the end of the run suggests
+   one, which may be far too large. */
+static double shown_size(const Engine *engine, const Point *point, bool *shown)
 {
-    double largest = 0.0;
-    for (size_t i = 0; i < engine->model->n_states; i++)
-        largest = fmax(largest, engine_state_size(engine, point, i, point->x[i]));
-    return largest;
+    const Status *status = engine->status;
+    bool declared = false;
+    double size = 0.0;
+    for (size_t i = 0; i < engine->model->n_states; i++) {
+        declared = declared || engine->model->nominals[i] > 0.0;
+        size = fmax(size, engine_state_size(engine, point, i, point->x[i]));
+    }
+    *shown = size >= DBL_MIN && (size >= status->floor || declared || status->jumps_time > status->start_time);
+    return *shown ? size : fmax(size, status->floor);
 }
 
 bool engine_leads_out(Engine *engine, const Point *point, double margin, bool *out)
 {
     const Status *status = engine->status;
     const ModelScales *scales = &engine->model->scales;
-    double h, t = *point->time;
-    if (!engine_first_step(engine, point, fmax(status->stop_time, t), &h))
+    bool shown;
+    double h, t = *point->time, size = shown_size(engine, point, &shown);
+    if (!engine_first_step(engine, point, fmax(status->stop_time, t), size, &h))
         return false;
     double probe = scales->probe * h, change, twice;
     /* As long as no state has shown its size, the step may be far too long. */
-    bool shown = largest_shown(engine, point) >= fmax(status->floor, DBL_MIN);
     *out = false;
     for (size_t i = shown ? N_PROBE_PARTS - 1 : 0; i < N_PROBE_PARTS; i++) {
         double span = scales->probe_parts[i] * probe;

@@ -90,7 +90,7 @@ def steps(point: Point, end: float) -> Any:
         raise SimulationError(_failure(point, flow_map, point.t, point.x, None))
     if point.t == point.t_start or point.sizes.max() == 0.0:
         _raise_floor(point, end)
-    first = min(point.next_step or step_from(point, end), options.max_step, end - point.t)
+    first = min(point.next_step or _first_step(point, end), options.max_step, end - point.t)
     stepper, pace = _stepper(point, flow_map, end, first), Pace(point, end)
     while stepper.status == "running":
         t0, x0 = stepper.t, stepper.y
@@ -113,7 +113,7 @@ def steps(point: Point, end: float) -> Any:
             stepper.atol = _absolute_tolerance(point, 0.0)
             pace.check(stepper.t)
         elif not flow_map.trouble and _raise_floor(point, end):
-            stepper = _stepper(point, flow_map, end, min(step_from(point, end), options.max_step))
+            stepper = _stepper(point, flow_map, end, min(_first_step(point, end), options.max_step))
         else:
             kind = StuckError if flow_map.trouble else SimulationError
             raise kind(_failure(point, flow_map, t0, x0, problem or "the step length fell to zero"))
@@ -133,6 +133,11 @@ def _stepper(point: Point, flow_map: FlowMap, end: float, first: float) -> Any:
         max_step=options.max_step,
         first_step=first,
     )
+
+
+def _first_step(point: Point, end: float) -> float:
+    """Return the length of a first step towards `end`, in s."""
+    return step_from(point, end, max(float(point.sizes.max(initial=0.0)), point.floor))
 
 
 def _raise_floor(point: Point, end: float) -> bool:

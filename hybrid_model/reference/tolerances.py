@@ -102,8 +102,8 @@ def leads_out(point: Point) -> bool:
     rates = quiet_rates(point, point.t, point.x)
     if not np.isfinite(rates).all():
         return False
-    probe = PROBE * step_from(point, point.t_stop)
-    shown = float(point.sizes.max(initial=0.0)) >= max(point.floor, SMALLEST)
+    size, shown = shown_size(point)
+    probe = PROBE * step_from(point, point.t_stop, size)
     margin = point.flow_margin()
     for span in (probe,) if shown else (part * probe for part in PROBE_PARTS):
         change = _margin_change(point, rates, margin, span)
@@ -113,6 +113,18 @@ def leads_out(point: Point) -> bool:
                 continue
         return change < 0.0
     return False
+
+
+def shown_size(point: Point) -> tuple[float, bool]:
+    """Return the largest size of the states, and whether the run or a nominal value has shown it.
+
+    Else the end of the run suggests one, which may be far too large.
+    """
+    size = float(point.sizes.max(initial=0.0))
+    declared = not np.isnan(point.nominal).all()
+    if size >= SMALLEST and (size >= point.floor or declared or point.t_jump > point.t_start):
+        return size, True
+    return max(size, point.floor), False
 
 
 def _margin_change(point: Point, rates: FloatArray, margin: float, span: float) -> float:
@@ -130,11 +142,10 @@ def _margin_change(point: Point, rates: FloatArray, margin: float, span: float) 
     return change if forward else -change
 
 
-def step_from(point: Point, end: float) -> float:
-    """Return the length of a first step from the present point, not beyond `end`."""
+def step_from(point: Point, end: float, size: float) -> float:
+    """Return the length of a first step from the present point, not beyond `end`, for states of a size."""
     if not end > point.t:
         return end - point.t_start
-    size = max(float(point.sizes.max(initial=0.0)), point.floor)
     rates_at = functools.partial(quiet_rates, point)
     return first_step(rates_at, point.t, point.x, end, size=size, rtol=point.solver.rtol, order=ORDER)
 

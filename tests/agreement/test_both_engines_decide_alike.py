@@ -243,14 +243,26 @@ def test_models_carry_every_number_that_the_engine_in_c_reads():
     assert int(re.search(r"#define N_GAPS (\d+)", engine)[1]) == GAPS
 
 
-@pytest.mark.parametrize("t_stop", [None, 5.5, 1e6, 1e9])
-def test_a_distant_end_or_none_changes_nothing_at_a_border(exported, t_stop):
+class Nominal(FlowFirst):
+    """Tells the size of its state, which the run has not shown at the start."""
+
+    x = hm.State(0.0, nominal=1.0, output=True)
+
+
+@pytest.mark.parametrize(
+    ("kind", "t_stop"),
+    [
+        *((FlowFirst, t_stop) for t_stop in (None, 5.5, 1e6, 1e9, 1e12)),
+        *((Nominal, t_stop) for t_stop in (None, 5.5, 1e12, 1e15, 1e18)),
+    ],
+)
+def test_a_distant_end_or_none_changes_nothing_at_a_border(exported, kind, t_stop):
     """At the start x = 0 has shown no size: what the end of the run makes of its steps must not hide where it goes."""
     turns = [1.0, 2.0, 3.0, 4.0, 5.0]
     if t_stop is not None:
-        arc = hm.simulate(FlowFirst(), t_stop, zeno=hm.ZenoGuard(max_jumps=5))
+        arc = hm.simulate(kind(), t_stop, zeno=hm.ZenoGuard(max_jumps=5))
         assert [jump.t for jump in arc.jumps[:5]] == pytest.approx(turns, abs=1e-12)
-    slave = FmuSlave("a", exported(FlowFirst(), "flow_first"))
+    slave = FmuSlave("a", exported(kind(), f"distant_end_{kind.__name__}"))
     slave.start(0.0, t_stop, events=False)
     slave.begin()
     made = slave.step(0.0, 5.4)
