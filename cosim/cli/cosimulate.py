@@ -61,7 +61,12 @@ def add_parser(commands: Any) -> None:
         metavar="NAME=VALUE",
         help="a number, true or false, the name of an enumeration's item, text, or bytes in base 16; repeatable",
     )
-    parser.add_argument("--output-file", type=Path, metavar="F.csv", help="write all outputs over time")
+    parser.add_argument(
+        "--output-file",
+        type=Path,
+        metavar="F.csv",
+        help="write all outputs over time, of event-exact runs with both rows of a jump",
+    )
     parser.add_argument(
         "--no-validate", action="store_true", help="run an .fmu even if its description does not fit the schema"
     )
@@ -150,7 +155,8 @@ def _run(system: System, options: argparse.Namespace, t_stop: float | None) -> C
     # A step is proposed for masters that need short ones; here it is the output that it would make long.
     dense = proposed is not None and t_stop - t_start > MOST * proposed
     interval = _given(options.output_interval, None if dense else proposed, _part(t_stop - t_start, OUTPUT_INTERVAL))
-    return run_event_exact(system, t_stop, t_start=t_start, output_interval=interval)
+    rows = bool(options.output_file)
+    return run_event_exact(system, t_stop, t_start=t_start, output_interval=interval, record_events=rows)
 
 
 def _part(length: float, wanted: float) -> float:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Given
-from cosim.masters.start import outputs, require_times, sample, sample_end, start_slaves
+from cosim.masters.start import outputs, require_times, sample_change, sample_end, start_slaves
 from cosim.result import CosimResult
 from cosim.system import System
 from hybrid_model.errors import SchedulingError
@@ -23,6 +23,7 @@ def run_event_exact(
     *,
     t_start: float = 0.0,
     output_interval: float | None = None,
+    record_events: bool = False,
     inputs: Mapping[str, Given] | None = None,
 ) -> CosimResult:
     """Run a system whose slaves exchange discrete signals only, each event at its exact time.
@@ -35,6 +36,9 @@ def run_event_exact(
         Times in s.
     output_interval : float, optional
         Record all outputs at multiples of this time; default: only at the end.
+    record_events : bool
+        With an output interval, record them also on both sides of each instant with events: before its first jump, and
+        after its last one if that has changed an output. All slaves are stepped there for it.
     inputs : mapping, optional
         ``"slave.variable"`` -> number or `hybrid_model.Signal`, for inputs that nothing drives and tunable parameters.
         A signal is asked at the start and at its breakpoints, each of which is an event, and held between.
@@ -54,14 +58,20 @@ def run_event_exact(
     require_times(t_start, t_stop, output_interval, "output interval")
     _require_discrete(system)
     changes = Changes(system, inputs or {}, t_start)
-    scheduler = Scheduler(system.slaves, system.from_slave, t_start)
-    result = CosimResult(t=t_start, ticks=scheduler.ticks, events=scheduler.events)
+    result = CosimResult(t=t_start)
+
+    def row(t: float) -> None:
+        sample_change(system, result, t, system.output_names)
+
+    watch = row if record_events and output_interval is not None else None
+    scheduler = Scheduler(system.slaves, system.from_slave, t_start, watch=watch)
+    result.ticks, result.events = scheduler.ticks, scheduler.events
     try:
         start_slaves(system, t_start, t_stop, events=True, changes=changes)
         scheduler.handle_events(t_start, system.slaves)
         if output_interval is not None:
-            sample(system, result, t_start, system.output_names)
-        _advance(scheduler, system, result, t_stop, output_interval, changes)
+            sample_end(system, result, t_start, system.output_names)
+        _advance(scheduler, system, result, t_stop, output_interval, changes, watch)
         if scheduler.ended and output_interval is not None:
             sample_end(system, result, scheduler.ended[1], system.output_names)
         result.final = outputs(system)
@@ -82,31 +92,38 @@ def _advance(
     t_stop: float,
     output_interval: float | None,
     changes: Changes,
+    watch: Callable[[float], None] | None,
 ) -> None:
     t_start = scheduler.t
     # A last point that rounding puts before the stop time is the stop time.
     count = 1 if output_interval is None else math.ceil((t_stop - t_start) / output_interval * (1.0 - ROUNDING))
     for k in range(1, count + 1):
         grid = t_stop if output_interval is None or k == count else t_start + k * output_interval
-        _change_on_the_way(scheduler, system, grid, changes)
+        _change_on_the_way(scheduler, system, grid, changes, watch)
         scheduler.advance_to(grid)
         if scheduler.ended:
             return
         if output_interval is not None:
-            sample(system, result, grid, system.output_names)
+            sample_end(system, result, grid, system.output_names)
 
 
-def _change_on_the_way(scheduler: Scheduler, system: System, limit: float, changes: Changes) -> None:
+def _change_on_the_way(
+    scheduler: Scheduler, system: System, limit: float, changes: Changes, watch: Callable[[float], None] | None
+) -> None:
     """Set what changes up to `limit` in s, each time as an event of the slaves concerned."""
     while not scheduler.ended and (due := changes.next_time(limit)) is not None:
         scheduler.advance_to(due)
         if scheduler.ended:
             return
+        if watch:
+            watch(due)
         changed = changes.take(due)
         for slave, names in changed.items():
             system.slaves[slave].enter_event_mode()
             changes.set(names, due)
         scheduler.handle_events(due, changed)
+        if watch:
+            watch(due)
 
 
 def _require_discrete(system: System) -> None:

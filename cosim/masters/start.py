@@ -89,6 +89,12 @@ def sample_end(system: System, result: CosimResult, t: float, names: Sequence[st
         sample(system, result, t, names)
 
 
+def sample_change(system: System, result: CosimResult, t: float, names: Sequence[str]) -> None:
+    """Append the named outputs at `t` to the result, if the time or one of them is news."""
+    if not result.times or result.times[-1] < t or any(result.signals[n][-1] != system.get(n) for n in names):
+        sample(system, result, t, names)
+
+
 def outputs(system: System) -> dict[str, float]:
     """Return all outputs by ``slave.output``."""
     return {name: system.get(name) for name in system.output_names}

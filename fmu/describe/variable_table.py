@@ -16,11 +16,10 @@ from fmu.errors import ExportError
 from hybrid_model import Automaton
 from hybrid_model.declare.layout import Layout, Place
 from hybrid_model.declare.transitions import Trigger
-from hybrid_model.declare.variables import Kind, element_names
+from hybrid_model.declare.variables import INTEGERS, Kind, element_names
 from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.trace import Trace
 
-_LEAST_INT32, _GREATEST_INT32 = -(2**31), 2**31 - 1
 _BANKS = {
     Kind.STATE: Bank.STATE,
     Kind.DISCRETE: Bank.DISCRETE,
@@ -114,11 +113,12 @@ def _require_integers(variable: FmuVariable) -> None:
         for name, bound in (("has the minimum", variable.minimum), ("has the maximum", variable.maximum))
         if bound is not None
     ]
+    least, greatest = INTEGERS
     for what, value in given:
-        if not (_LEAST_INT32 <= value <= _GREATEST_INT32 and value == int(value)):
+        if not (least <= value <= greatest and value == int(value)):
             raise ExportError(
                 f"The integer variable {variable.name!r} {what} {value:.17g}: an FMU's integers are whole numbers from "
-                f"{_LEAST_INT32} to {_GREATEST_INT32}, so give one of them, or declare the variable without integer."
+                f"{least} to {greatest}, so give one of them, or declare the variable without integer."
             )
 
 

@@ -18,6 +18,8 @@ from hybrid_model.errors import DeclarationError
 FloatArray = npt.NDArray[np.float64]
 Value = Any
 """A scalar or array of floats in a run, of symbols in a trace: maps are written for both."""
+INTEGERS = (-(2**31), 2**31 - 1)
+"""The least and the greatest that what is declared integer may be: those of FMI's Integer and Int32 (rule 10)."""
 
 
 class Kind(enum.Enum):

@@ -30,6 +30,11 @@ static bool refused(Engine *engine, Ending ending, size_t jump, size_t i, double
                        starts ? "" : NAME_AT(m->names, m->jumps[jump].name), starts ? "" : "'", rule);
 }
 
+static bool is_integer(double value)
+{
+    return value == floor(value) && value >= INT32_MIN && value <= INT32_MAX;
+}
+
 /* Copies the new state in engine->reset into the point if all of it is finite, and whole where it must be; it comes
    from a jump, or (n_jumps) from the start map. */
 static bool accept_state(Engine *engine, size_t jump, const Point *point)
@@ -40,9 +45,10 @@ static bool accept_state(Engine *engine, size_t jump, const Point *point)
             return refused(engine, ENDED_NOT_FINITE, jump, i, *point->time,
                            "states must be finite. Remedy: check that map and the parameters.");
     for (size_t i = 0; i < m->n_discrete; i++)
-        if (m->whole[i] && engine->reset.z[i] != floor(engine->reset.z[i]))
+        if (m->whole[i] && !is_integer(engine->reset.z[i]))
             return refused(engine, ENDED_FAILED, jump, m->n_states + i, *point->time,
-                           "it is declared integer and must stay a whole number. Remedy: round it in that map.");
+                           "it is declared integer and must stay a whole number from -2147483648 to 2147483647. "
+                           "Remedy: round it in that map, or declare it without integer.");
     engine_copy(point->x, engine->reset.x, m->n_states + m->n_discrete);
     engine_note_sizes(engine, point);
     *point->step = 0.0;

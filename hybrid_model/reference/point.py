@@ -13,7 +13,7 @@ from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.layout import not_finite
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.transitions import Trigger
-from hybrid_model.declare.variables import FloatArray, Kind, Values
+from hybrid_model.declare.variables import INTEGERS, FloatArray, Kind, Values
 from hybrid_model.declare.vector_form import vector_form
 from hybrid_model.errors import SimulationError
 from hybrid_model.record.flow_piece import FlowPiece
@@ -139,7 +139,7 @@ class Point:
         Raises
         ------
         SimulationError
-            If a new value is not finite, or a fraction where it must be whole.
+            If a new value is not finite, or no whole number of 32 bits where it must be one.
         """
         info = self.automaton.jumps[index]
         x, z = self.maps.reset(index, self.t, self.x, self.z, self.inputs.at(self.t), self.p)
@@ -220,12 +220,13 @@ class Point:
         bad = not_finite(self.layout, Kind.STATE, x) or not_finite(self.layout, Kind.DISCRETE, z)
         if bad:
             raise SimulationError(f"{self.automaton.name}: {bad} {when}: states must stay finite numbers.")
-        fractions = self._whole & (z != np.round(z))
-        if fractions.any():
-            k = int(fractions.argmax())
+        least, greatest = INTEGERS
+        no_integers = self._whole & ~((z == np.round(z)) & (z >= least) & (z <= greatest))
+        if no_integers.any():
+            k = int(no_integers.argmax())
             raise SimulationError(
                 f"{self.automaton.name}: {self.layout.names(Kind.DISCRETE)[k]} = {z[k]:.17g} {when}: it is declared "
-                "integer and must stay a whole number."
+                f"integer and must stay a whole number from {least} to {greatest}."
             )
 
     def _refuse_indicators(self, table: FloatArray) -> None:

@@ -85,6 +85,9 @@ class Scheduler:
     tolerance : float, optional
         In s: events of different blocks closer than this are handled at one instant, in the order of the blocks;
         default: as the run has it (`hybrid_model.scales`).
+    watch : callable, optional
+        ``watch(t)`` is called before and after the events of each instant that `advance_to` comes to. All blocks are
+        brought there for it, so an event then costs as much as there are blocks.
 
     Attributes
     ----------
@@ -106,6 +109,7 @@ class Scheduler:
         wires_from: Callable[[str], Iterable[Wire]],
         t_start: float,
         tolerance: float | None = None,
+        watch: Callable[[float], None] | None = None,
     ) -> None:
         self.t = self._t_start = t_start
         self.ticks: list[Tick] = []
@@ -114,6 +118,7 @@ class Scheduler:
         self.ended: tuple[str, float, Termination] | None = None
         self._wires_from = wires_from
         self._tolerance = tolerance
+        self._watch = watch
         self._places = {name: _Place(block, k, t_start, t_start) for k, (name, block) in enumerate(blocks.items())}
         self._unpredictable: set[str] = set()
         self._queue: list[tuple[float, int, int, str]] = []
@@ -130,15 +135,12 @@ class Scheduler:
             t, due = self._next_instant(limit)
             if not due:
                 break
-            self._note(t, due)
-            self.handle_events(t, due)
+            self._happen(t, due)
         for name, place in self._places.items():
             while not self.ended and place.t < limit:
                 if self._step(place, limit).event and not self.ended:
                     self._require_announced(place, limit)
-                    place.block.enter_event_mode()
-                    self._note(limit, {name})
-                    self.handle_events(limit, {name})
+                    self._happen(limit, {name})
         if not self.ended:
             self.t = limit
 
@@ -174,8 +176,30 @@ class Scheduler:
         for name in touched:
             self._leave_event_mode(name)
 
-    def _note(self, t: float, due: Collection[str]) -> None:
-        self.events += [Event(t, name) for name in sorted(due, key=lambda n: self._places[n].order)]
+    def _happen(self, t: float, due: set[str]) -> None:
+        """Handle the events of blocks that are at their instant."""
+        if self._watch:
+            due = self._bring_all(t, due)
+            self._watch(t)
+        if self.ended:
+            return
+        for name in self._in_order(due):
+            self._places[name].block.enter_event_mode()
+            self.events.append(Event(t, name))
+        self.handle_events(t, due)
+        if self._watch:
+            self._watch(t)
+
+    def _bring_all(self, t: float, due: set[str]) -> set[str]:
+        """Bring all blocks to an instant; return those that have events there."""
+        behind = [place for name, place in self._places.items() if place.t < t and name not in due]
+        stopped = [place for place in behind if not self.ended and self._step(place, t).event]
+        for place in stopped:
+            self._require_announced(place, t)
+        return due | {place.block.name for place in stopped}
+
+    def _in_order(self, names: Iterable[str]) -> list[str]:
+        return sorted(names, key=lambda name: self._places[name].order)
 
     def _send(self, name: str, t: float, touched: set[str]) -> set[str]:
         """Carry the outputs of a block to their receivers; return those for whom something changed."""
@@ -268,13 +292,11 @@ class Scheduler:
             instant = max(instant, time)
             due.add(name)
             self._drop_obsolete()
-        for name in sorted(due, key=lambda n: self._places[n].order):
+        for name in self._in_order(due):
             place = self._places[name]
             # What has stopped for an event is there; FMI allows no step before it is handled.
             if place.t < instant and place not in stopped and not self.ended:
                 self._step(place, instant)
-            if not self.ended:
-                place.block.enter_event_mode()
         return instant, set() if self.ended else due
 
     def _first_place(self) -> _Place:

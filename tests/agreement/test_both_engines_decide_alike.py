@@ -113,6 +113,7 @@ class YesOrNoJump(hm.HybridAutomaton):
     ("automaton", "words"),
     [
         (Halves(name="Rounded", more=2.0**-40), ["k", f"{1 + 2**-40:.17g}", "t = 1 ", "must stay a whole number"]),
+        (Halves(name="Long", more=3e9), ["k", "3000000001", "t = 1 ", "whole number from -2147483648 to 2147483647"]),
         (Halves(), ["k", "1.5", "t = 1 ", "tick", "declared integer and must stay a whole number"]),
         (Still(), ["time event 'tick' was due at 1 s and after its jump is due at 1 s", "move its time on"]),
         (StillInside(), ["time event 'tick' was due at 1 s and after its jump is due at 1 s", "move its time on"]),
@@ -129,6 +130,11 @@ def test_what_a_model_must_not_do_is_refused(automaton, words, exported):
     for word in words:
         assert word in str(refused.value)
         assert word in result.message
+
+
+def test_integers_have_32_bits(exported):
+    arc = hm.simulate(Halves(name="Longest", more=2.0**31 - 2), 2.0)
+    assert arc.end.k == run_fmu(exported, Halves(name="Longest", more=2.0**31 - 2), 2.0).final["a.k"] == 2**31 - 1
 
 
 class HalfStart(hm.HybridAutomaton):

@@ -97,6 +97,18 @@ def test_export_of_a_class_and_run_of_its_fmu(tmp_path, capsys):
     assert float(rows[-1]["Integrator.x"]) == 3.0
 
 
+def test_the_table_of_a_cosimulation_has_both_rows_of_a_jump(tmp_path, capsys):
+    """An impact at sqrt(2 / 9.81) s, between two points of the output."""
+    fmu, table = export_fmu(BouncingBall(), tmp_path / "ball.fmu"), tmp_path / "out.csv"
+    assert main(["cosim", str(fmu), "--stop-time", "1", "--output-file", str(table)]) == 0
+    with table.open() as file:
+        rows = [{name: float(cell) for name, cell in row.items()} for row in csv.DictReader(file)]
+    before, after = rows[5:7]
+    assert len(rows) == 11 + 2
+    assert before["time"] == after["time"] == pytest.approx((2 / 9.81) ** 0.5, abs=1e-9)
+    assert after["ball.v"] == -0.7 * before["ball.v"] > 0.0
+
+
 def test_a_scenario_exports_one_fmu_an_agent(small, tmp_path, capsys):
     assert main(["export", small, "--out", str(tmp_path / "fmus")]) == 0
     assert sorted(path.name for path in (tmp_path / "fmus").iterdir()) == ["agent1.fmu", "agent2.fmu", "agent3.fmu"]
