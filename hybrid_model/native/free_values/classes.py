@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable
+from operator import is_
 from types import ClassMethodDescriptorType, GetSetDescriptorType, MethodDescriptorType, WrapperDescriptorType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,13 +17,8 @@ from hybrid_model.native.free_values.containers import CONTAINERS, content, item
 from hybrid_model.native.free_values.reading import Reading, UntoldError
 from hybrid_model.native.free_values.watch import MISSING, slots_of
 
-_BODY_ONLY = frozenset(
-    {"__module__", "__doc__", "__dict__", "__weakref__", "__slots__", "__annotations__", "__qualname__", "_abc_impl"}
-    | {"__orig_bases__", "__parameters__", "__abstractmethods__", "__dataclass_fields__", "__dataclass_params__"}
-    | {"__firstlineno__", "__static_attributes__", "__annotate__", "__annotate_func__", "__annotations_cache__"}
-    | {"__classdictcell__"}
-)
-"""What Python keeps in a class for itself."""
+KEPT = "_kept_snapshot"
+"""Attribute of an automaton that holds what was found out about it; no map reads it."""
 _MAKING = frozenset(("__init__", "__new__", "__post_init__", "__init_subclass__", "__set_name__", "__class_getitem__"))
 """What runs when an instance or a subclass is made."""
 _SIMPLE = (int, float, complex, str, bytes)
@@ -30,9 +27,24 @@ _MADE_AT_RUN_TIME = 1 << 9
 _OF_C = (WrapperDescriptorType, MethodDescriptorType, ClassMethodDescriptorType, GetSetDescriptorType)
 
 
+class _Traits(NamedTuple):
+    """What can be said of a class: whether it is known, whether all state of an instance can be seen, whether code that
+    is not looked at may read any attribute.
+    """
+
+    known: bool
+    plain: bool
+    read: bool
+
+
+_found: dict[int, tuple[weakref.ref[type], tuple[type, ...], _Traits]] = {}
+"""Identity of a class -> itself, its bases and its traits, as long as it lives."""
+
+
 def describe_class(reading: Reading, number: int, cls: type) -> None:
     """Describe a class: its bases, and those of its attributes that code can read."""
-    if known.is_known(cls):
+    traits = _traits(cls)
+    if traits.known:
         reading.known_code(cls)
         reading.record(number, "known class", cls.__module__, cls.__qualname__)
         return
@@ -41,16 +53,13 @@ def describe_class(reading: Reading, number: int, cls: type) -> None:
     reading.watch.of_class(cls)
     bases = map(reading.reference, cls.__mro__[1:])
     reading.record(number, "class", cls.__name__, reading.reference(type(cls)), *bases)
-    everything = known.has_reading_base(cls)
     making: list[tuple[str, object]] = []
     for name, held in vars(cls).items():
-        if name in _BODY_ONLY:
-            continue
         if name in _MAKING or isinstance(held, ClassAttribute | Clock):
             making.append((name, held))
         else:
             # Operators and the like are read without a name.
-            reading.attribute(number, name, held, read=everything or name.startswith("__"))
+            reading.attribute(number, name, held, read=traits.read or name.startswith("__"))
     reading.making(number, cls, making)
     for word in vars(cls).get("__match_args__", ()):
         reading.word(word)
@@ -59,7 +68,8 @@ def describe_class(reading: Reading, number: int, cls: type) -> None:
 def describe_instance(reading: Reading, number: int, value: Any) -> None:
     """Describe an object: its class, what it holds as a container, and those of its attributes that code can read."""
     cls = type(value)
-    if not _is_plain(cls):
+    traits = _traits(cls)
+    if not traits.plain:
         raise UntoldError(f"a map reads a value of the class {cls.__module__}.{cls.__qualname__}")
     reading.watch.instance(value)
     reading.record(number, "instance", reading.reference(cls), *_content_of(reading, value))
@@ -68,9 +78,8 @@ def describe_instance(reading: Reading, number: int, value: Any) -> None:
         reading.watch.content(slots_of, value)
         reading.record(number, "slots", *[("missing",) if item is MISSING else reading.token(item) for item in slots])
     attributes = getattr(value, "__dict__", None)
-    everything = known.has_reading_base(cls)
-    for name, item in (attributes if isinstance(attributes, dict) else {}).items():
-        reading.attribute(number, name, item, read=everything)
+    if isinstance(attributes, dict):
+        reading.attributes(number, {name: item for name, item in attributes.items() if name != KEPT}, read=traits.read)
 
 
 def _content_of(reading: Reading, value: Any) -> list[object]:
@@ -82,6 +91,17 @@ def _content_of(reading: Reading, value: Any) -> list[object]:
         return content(reading, value)
     simple: Callable[[Any], str] | None = next((kind.__repr__ for kind in _SIMPLE if isinstance(value, kind)), None)
     return [] if simple is None else [simple(value)]
+
+
+def _traits(cls: type) -> _Traits:
+    found = _found.get(id(cls))
+    bases = cls.__mro__[1:]
+    if found is not None and found[0]() is cls and len(found[1]) == len(bases) and all(map(is_, found[1], bases)):
+        return found[2]
+    traits = _Traits(known.is_known(cls), _is_plain(cls), known.has_reading_base(cls))
+    key = id(cls)
+    _found[key] = weakref.ref(cls, lambda _: _found.pop(key, None)), bases, traits
+    return traits
 
 
 def _is_plain(cls: type) -> bool:

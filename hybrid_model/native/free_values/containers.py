@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections import OrderedDict, defaultdict, deque
 from collections.abc import Callable
+from hashlib import blake2b
 from typing import Any
 
 import numpy as np
 
 from hybrid_model.native.free_values.reading import Reading, UntoldError
+
+_LONG = 100
 
 Items = Callable[[Any], tuple[Any, ...]]
 
@@ -20,7 +23,7 @@ CONTAINERS: dict[type, Items] = {
     tuple: lambda value: tuple(tuple.__iter__(value)),
     set: lambda value: tuple(set.__iter__(value)),
     frozenset: lambda value: tuple(frozenset.__iter__(value)),
-    deque: lambda value: (value.maxlen, *deque.__iter__(value)),
+    deque: lambda value: tuple(deque.__iter__(value)),
     # Their elements are small numbers, which are the same objects always.
     bytearray: lambda value: tuple(bytearray.__iter__(value)),
 }
@@ -46,7 +49,8 @@ def content(reading: Reading, array: np.ndarray[Any, Any]) -> list[object]:
     if array.dtype.hasobject:
         return ["objects", array.shape, *items_of(reading, _objects, array)]
     reading.watch.array(array)
-    return ["array", array.dtype.str, array.shape, np.ndarray.tobytes(array)]
+    elements = np.ndarray.tobytes(array)
+    return ["array", array.dtype.str, array.shape, elements if len(elements) < _LONG else blake2b(elements).digest()]
 
 
 def _objects(array: np.ndarray[Any, Any]) -> tuple[Any, ...]:

@@ -143,4 +143,4 @@ def framework_words() -> frozenset[str]:
         found.update(vars(cls), inspect.get_annotations(cls))
         for function in filter(inspect.isfunction, vars(cls).values()):
             found.update(item.argval for item in dis.get_instructions(function) if item.opname == "STORE_ATTR")
-    return frozenset(found)
+    return frozenset(word for word in found if not word.startswith(("__", "_abc")))

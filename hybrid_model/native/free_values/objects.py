@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import collections
+import enum
 import functools
 import types
 from collections.abc import Callable
 from dataclasses import fields
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,9 @@ from hybrid_model.native.free_values.containers import CONTAINERS, content, item
 from hybrid_model.native.free_values.reading import Reading, UntoldError
 
 _FIELD_OF_TUPLE = type(vars(collections.namedtuple("_Pair", "first second"))["first"])
-_VARIABLE = tuple(field.name for field in fields(Variable) if field.name not in ("start", "unit", "description"))
+_declared = attrgetter(
+    *(field.name for field in fields(Variable) if field.name not in ("start", "unit", "description"))
+)
 """What of a variable a trace may depend on; its start value is data."""
 
 
@@ -45,15 +49,17 @@ def describe(reading: Reading, value: Any) -> None:
         _number(reading, number, value)
     elif isinstance(value, np.dtype):
         reading.record(number, "dtype", str(value.descr))
-    elif callable(value) and not hasattr(value, "__dict__") and known.is_known(value):
+    elif callable(value) and known.is_known(value):
         reading.known_code(value)
         reading.record(number, "known", value.__module__, value.__qualname__)
+    elif isinstance(value, enum.Enum) and known.is_known(kind):
+        reading.record(number, "member", kind.__qualname__, value.name)
     else:
         describe_instance(reading, number, value)
 
 
 def _variable(reading: Reading, number: int, value: Variable) -> None:
-    reading.record(number, "variable", value.start.shape, *[reading.token(getattr(value, name)) for name in _VARIABLE])
+    reading.record(number, "variable", value.start.shape, *map(reading.token, _declared(value)))
 
 
 def _array(reading: Reading, number: int, value: np.ndarray[Any, Any]) -> None:
@@ -84,8 +90,7 @@ def _view(reading: Reading, number: int, value: types.MappingProxyType[Any, Any]
 def _namespace(reading: Reading, number: int, value: types.SimpleNamespace) -> None:
     reading.watch.instance(value)
     reading.record(number, "namespace")
-    for name, item in vars(value).items():
-        reading.attribute(number, name, item)
+    reading.attributes(number, vars(value))
 
 
 def _slice(reading: Reading, number: int, value: slice) -> None:
@@ -155,9 +160,9 @@ def _function(reading: Reading, number: int, value: types.FunctionType) -> None:
             return
     reading.watch.function(value)
     parts = (value.__defaults__, value.__kwdefaults__, tuple(vars(value).items()), value.__closure__)
-    reading.record(number, "function", token, *reading.tokens(parts))
+    reading.record(number, "function", token, value.__name__, *reading.tokens(parts))
     if not is_known:
-        reading.code(value.__code__, value.__globals__)
+        reading.code(number, value.__code__, value.__globals__)
 
 
 _KINDS: dict[type, Callable[[Reading, int, Any], None]] = {

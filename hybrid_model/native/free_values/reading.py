@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from types import CodeType, ModuleType
 from typing import Any
 
@@ -25,7 +25,17 @@ _VALUES_READ = ("variables", "of_kind", "__dict__")
 """Words by which a map gets at start values, which are data otherwise."""
 _TAKING_NAMES = ("__dict__", "__getattribute__", "attrgetter", "methodcaller")
 """Words by which code gets at attributes that it does not name."""
+_UNTOLD = ("__globals__", "__builtins__", "__subclasses__", "__annotations__", "__doc__")
+"""Words by which code gets at what is not looked at."""
 _ITS_CLASS = "__class__"
+_HIDDEN = frozenset(
+    {"__module__", "__doc__", "__dict__", "__weakref__", "__slots__", "__annotations__", "__qualname__", "_abc_impl"}
+    | {"__orig_bases__", "__parameters__", "__abstractmethods__", "__dataclass_fields__", "__dataclass_params__"}
+    | {"__firstlineno__", "__static_attributes__", "__annotate__", "__annotate_func__", "__annotations_cache__"}
+    | {"__classdictcell__"}
+)
+"""What Python keeps in a class for itself: read only where code names it."""
+_LARGE = 1 << 63
 
 
 class UntoldError(Exception):
@@ -60,6 +70,7 @@ class Reading:
         self._waiting: dict[str, list[tuple[int, object]]] = {}
         self._modules: list[ModuleType] = []
         self._resolved: set[tuple[int, str]] = set()
+        self._orders: list[tuple[int, list[str]]] = []
         self._making: dict[int, list[tuple[int, str, object]]] = {}
         self._made: set[int] = set()
 
@@ -78,7 +89,8 @@ class Reading:
         """Return what stands for a value in a record."""
         kind = type(value)
         if kind in _LEAVES:
-            return value
+            # The digits of a number are limited.
+            return hex(value).encode() if isinstance(value, int) and abs(value) > _LARGE else value
         if isinstance(value, tuple) and kind is tuple:
             return ("tuple", *map(self.token, value))
         if isinstance(value, type):
@@ -106,10 +118,17 @@ class Reading:
 
     def attribute(self, owner: int, name: str, value: object, *, read: bool = False) -> None:
         """Note an attribute; it is described when it is read, or as soon as some code names it."""
-        if read or self._every_word or name in self._words:
+        if name in self._words or ((read or self._every_word) and name not in _HIDDEN):
             self.records.append((owner, name, self.token(value)))
         else:
             self._waiting.setdefault(name, []).append((owner, value))
+
+    def attributes(self, owner: int, values: Mapping[str, object], *, read: bool = False) -> None:
+        """Note the attributes of an object, whose order only code that lists them sees."""
+        names = list(values)
+        self._orders.append((owner, names))
+        for name in sorted(names):
+            self.attribute(owner, name, values[name], read=read)
 
     def making(self, owner: int, cls: type, items: list[tuple[str, object]]) -> None:
         """Note attributes of a class that are read only where code has the class itself, as when it makes instances."""
@@ -123,6 +142,8 @@ class Reading:
         if word in self._own_words:
             return
         self._own_words.add(word)
+        if word in _UNTOLD:
+            raise UntoldError(f"a map reads {word}")
         if word in _VALUES_READ:
             self.start_values = True
         if word in _TAKING_NAMES:
@@ -146,6 +167,9 @@ class Reading:
         self._refuse_modules()
         waiting, self._waiting = self._waiting, {}
         for name, items in waiting.items():
+            if name in _HIDDEN:
+                self._waiting[name] = items
+                continue
             for owner, value in items:
                 self.records.append((owner, name, self.token(value)))
 
@@ -168,8 +192,9 @@ class Reading:
 
     # Code and modules.
 
-    def code(self, code: CodeType, where: dict[str, Any]) -> None:
-        """Follow what code names, with the globals that it was made with."""
+    def code(self, number: int, code: CodeType, where: dict[str, Any]) -> None:
+        """Follow what the code of function `number` names, with the globals that it was made with."""
+        self.record(number, "globals", self._number_of(where))
         names = code_names(code)
         for word in names.words:
             self.word(word)
@@ -197,6 +222,8 @@ class Reading:
         """Watch names of modules that do not exist yet; refuse what is known at the end only."""
         if self._bare_arrays and not self._own_words.isdisjoint(known.OUTSIDE):
             raise UntoldError("a map may read random numbers or a file by numpy")
+        if self._every_word:
+            self.records += [("order", owner, *names) for owner, names in self._orders]
         for module in self._modules:
             self.watch.names(vars(module), sorted(self._words))
         self.watch.close()
@@ -208,7 +235,7 @@ class Reading:
             found = _builtins(where)
             value = found.get(name, MISSING)
             self._refuse_builtin(name)
-        attributes = sorted(taken) if taken is not None and isinstance(value, ModuleType) else None
+        attributes = sorted(taken) if taken is not None and type(value) is ModuleType else None
         if (id(where), name) not in self._resolved:
             self._resolved.add((id(where), name))
             self.watch.names(where, (name,))
@@ -218,8 +245,8 @@ class Reading:
             self.records.append(("global", self._number_of(where), name, shown))
         elif value is not MISSING and attributes is None:
             self.token(value)
-        if isinstance(value, ModuleType):
-            for attribute in attributes or ():
+        if isinstance(value, ModuleType) and attributes is not None:
+            for attribute in attributes:
                 self._attribute_of_module(value, attribute)
 
     def _refuse_builtin(self, name: str) -> None:
@@ -243,9 +270,9 @@ class Reading:
         if (id(here), name) in self._resolved:
             return
         self._resolved.add((id(here), name))
-        self.watch.names(here, (name,))
         # A module may make what is asked for.
         found = name if name in here else "__getattr__"
+        self.watch.names(here, (name, found))
         if found in here:
             self.records.append(("of module", self._number_of(here), name, found, self.token(here[found])))
 

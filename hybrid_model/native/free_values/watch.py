@@ -19,7 +19,7 @@ MISSING = object()
 
 Array = np.ndarray[Any, Any]
 
-_parts_of_function = attrgetter("__code__", "__defaults__", "__kwdefaults__")
+_parts_of_function = attrgetter("__code__", "__name__", "__defaults__", "__kwdefaults__")
 _order_of_bases = attrgetter("__mro__")
 
 
@@ -35,7 +35,8 @@ class Watch:
         self._lookups: list[tuple[Mapping[str, Any], tuple[str, ...]]] = []
         self._contents: list[tuple[Callable[[Any], tuple[Any, ...]], Any]] = []
         self._arrays: list[tuple[Array, Any, tuple[int, ...], bytes]] = []
-        self._then: tuple[tuple[Any, ...], ...] = ()
+        self._sizes: list[int] = []
+        self._then: list[tuple[Any, ...]] = []
 
     def instance(self, value: object) -> None:
         """Watch the class of an object and its attributes."""
@@ -57,9 +58,11 @@ class Watch:
         self._arrays.append((value, value.dtype, value.shape, value.tobytes()))
 
     def function(self, value: FunctionType) -> None:
-        """Watch the code of a function, its defaults and its attributes."""
+        """Watch the code of a function, its name, its defaults and its attributes."""
         self._functions.append(value)
         self._dictionaries.append(vars(value))
+        if value.__kwdefaults__:
+            self._dictionaries.append(value.__kwdefaults__)
 
     def of_class(self, value: type) -> None:
         """Watch all attributes of a class, and its bases."""
@@ -75,33 +78,37 @@ class Watch:
 
     def close(self) -> None:
         """Note what everything is now."""
-        self._then = self._now()
+        self._sizes = self._sizes_now()
+        self._then = list(map(tuple, self._now()))
 
     def still_holds(self) -> bool:
         """Whether everything is what it was."""
-        now = self._now()
-        return all(
-            len(values) == len(before) and all(map(is_, values, before))
-            for values, before in zip(now, self._then, strict=True)
-        ) and all(_is_content(*array) for array in self._arrays)
-
-    def _now(self) -> tuple[tuple[Any, ...], ...]:
-        bodies = [vars(cls) for cls in self._classes]
-        # Lengths as well: what one dictionary has lost, the next may have won.
+        # Where all sizes are what they were, `map` leaves nothing out.
         return (
-            tuple(map(type, self._objects)),
-            tuple(map(dict.__len__, self._dictionaries)),
-            tuple(chain.from_iterable(map(dict.__iter__, self._dictionaries))),
-            tuple(chain.from_iterable(map(dict.values, self._dictionaries))),
-            tuple(map(_order_of_bases, self._classes)),
-            tuple(map(len, bodies)),
-            tuple(chain.from_iterable(bodies)),
-            tuple(chain.from_iterable([body.values() for body in bodies])),
-            tuple(chain.from_iterable(map(_parts_of_function, self._functions))),
-            tuple(map(_content_of_cell, self._cells)),
-            tuple([where.get(name, MISSING) for where, names in self._lookups for name in names]),
-            *[read(value) for read, value in self._contents],
+            self._sizes_now() == self._sizes
+            and all(all(map(is_, now, then)) for now, then in zip(self._now(), self._then, strict=True))
+            and all(_is_content(*array) for array in self._arrays)
         )
+
+    def _sizes_now(self) -> list[int]:
+        sizes = list(map(dict.__len__, self._dictionaries))
+        sizes += [len(vars(cls)) for cls in self._classes]
+        return sizes + [len(read(value)) for read, value in self._contents]
+
+    def _now(self) -> list[Iterable[Any]]:
+        bodies = [vars(cls) for cls in self._classes]
+        return [
+            map(type, self._objects),
+            chain.from_iterable(map(dict.__iter__, self._dictionaries)),
+            chain.from_iterable(map(dict.values, self._dictionaries)),
+            map(_order_of_bases, self._classes),
+            chain.from_iterable(bodies),
+            chain.from_iterable([body.values() for body in bodies]),
+            chain.from_iterable(map(_parts_of_function, self._functions)),
+            map(_content_of_cell, self._cells),
+            [where.get(name, MISSING) for where, names in self._lookups for name in names],
+            chain.from_iterable([read(value) for read, value in self._contents]),
+        ]
 
 
 def _is_content(array: Array, dtype: Any, shape: tuple[int, ...], content: bytes) -> bool:
