@@ -10,7 +10,7 @@ import casadi as ca
 
 _OPTIONS: dict[str, Any] = {
     "with_header": False,
-    "with_export": False,
+    "with_export": True,
     "cpp": False,
     "main": False,
     "mex": False,
@@ -35,8 +35,8 @@ def functions(name: str, given: Iterable[ca.Function]) -> str:
     generator = ca.CodeGenerator(name, _OPTIONS)
     for function in given:
         generator.add(function)
-    text: str = generator.dump()
-    return text
+    # A dozen functions that describe it come with each map; unused ones that nobody else may call are not compiled.
+    return f"#define CASADI_SYMBOL_EXPORT static\n{generator.dump()}"
 
 
 def string(text: str) -> str:

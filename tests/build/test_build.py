@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 import fmu.build.binaries
-import fmu.build.libraries
 from fmu.archives.writing import check_target, package
 from fmu.build.binaries import binaries, compile_fmu, fmi_headers, runtime_sources
 from fmu.errors import BuildError
+from hybrid_model.native.build import objects
 from hybrid_model.native.build.compiler import find_compiler
 
 # The smallest library with an FMI function, and what a model's generated code may hold.
@@ -61,6 +61,13 @@ def logged(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return log
 
 
+@pytest.fixture
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A cache in which nothing is yet."""
+    monkeypatch.setenv("HYBRID_FMU_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
 def compiled(log: Path) -> list[str]:
     """The names of the files compiled so far."""
     calls = [line.split() for line in log.read_text().splitlines()]
@@ -71,8 +78,7 @@ def compiled(log: Path) -> list[str]:
 
 
 @posix
-def test_the_runtime_is_compiled_once_a_process(logged, tmp_path, monkeypatch):
-    monkeypatch.setattr(fmu.build.libraries, "_objects", {})
+def test_the_runtime_is_compiled_once(logged, empty_cache, tmp_path):
     sources = runtime_sources()
     for k in range(3):
         source = tmp_path / str(k) / "model.c"
@@ -86,7 +92,7 @@ def test_the_runtime_is_compiled_once_a_process(logged, tmp_path, monkeypatch):
 
 @posix
 @pytest.mark.parametrize("change", ["source", "header", "flags", "compiler", "nothing"])
-def test_kept_objects_are_those_of_the_same_build(change, logged, tmp_path, monkeypatch):
+def test_kept_objects_are_those_of_the_same_build(change, logged, empty_cache, tmp_path, monkeypatch):
     """Whatever changes an object makes a new one."""
     runtime = tmp_path / "runtime"
     runtime.mkdir()
@@ -95,8 +101,7 @@ def test_kept_objects_are_those_of_the_same_build(change, logged, tmp_path, monk
         '#include "fmi3Functions.h"\n#include "value.h"\nconst char *fmi3GetVersion(void) { return "v" + VALUE; }\n'
     )
     monkeypatch.setattr(fmu.build.binaries, "OWN_FOLDERS", (runtime,))
-    monkeypatch.setattr(fmu.build.libraries, "_objects", {})
-    monkeypatch.setattr(fmu.build.libraries, "STRICT_FLAGS", ())
+    monkeypatch.setattr(objects, "STRICT_FLAGS", ())
     compile_fmu([runtime / "version.c"], [fmi_headers()], tmp_path / "One.so")
     if change == "source":
         (runtime / "version.c").write_text(
@@ -105,7 +110,7 @@ def test_kept_objects_are_those_of_the_same_build(change, logged, tmp_path, monk
     elif change == "header":
         (runtime / "value.h").write_text("#define VALUE 0\n")
     elif change == "flags":
-        monkeypatch.setattr(fmu.build.libraries, "COMMON_FLAGS", (*fmu.build.libraries.COMMON_FLAGS, "-fno-builtin"))
+        monkeypatch.setattr(objects, "COMMON_FLAGS", (*objects.COMMON_FLAGS, "-fno-builtin"))
     elif change == "compiler":
         script = Path(os.environ["CC"])
         script.write_text(script.read_text() + "# another version\n")

@@ -45,7 +45,7 @@ def zig_folder() -> Path:
 def trusted_folder() -> Path | None:
     """Return the folder of compiled files, made if need be, or None if there is none that is safe to load from.
 
-    Safe is a folder of this user's in which nobody else may write, below folders that nobody else may rename.
+    Safe is a folder in which nobody else may write, below folders in which not everybody may replace it.
     """
     try:
         folder = cache_root() / "built"
@@ -59,12 +59,12 @@ def trusted_folder() -> Path | None:
 
 
 def is_private(path: Path) -> bool:
-    """Return whether a file or folder belongs to this user and nobody else may write to it."""
+    """Return whether a file or folder belongs to this user or the system's, and nobody else may write to it."""
     if sys.platform == "win32":
         # Folders of a user are closed to others by access lists, which the mode does not show.
         return True
     status = path.stat()
-    return status.st_uid == os.geteuid() and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return status.st_uid in (os.geteuid(), 0) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _keeps_names(folder: Path) -> bool:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import functools
 import importlib.util
 import os
+import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -13,8 +15,13 @@ from pathlib import Path
 
 from hybrid_model.errors import BuildError
 
-IMPORTANT_VARIABLES = ("PATH", "CPATH", "C_INCLUDE_PATH", "GCC_EXEC_PREFIX", "COMPILER_PATH", "SDKROOT")
+IMPORTANT_VARIABLES = (
+    *("CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH", "GCC_EXEC_PREFIX", "COMPILER_PATH"),
+    *("SDKROOT", "DEVELOPER_DIR", "MACOSX_DEPLOYMENT_TARGET"),
+)
 """Of the environment: what can change a compiler's results."""
+_COMPILER_ITSELF = re.compile(r"(?:[\w.]+-)*(?:gcc|clang|zig)(?:-[\d.]+)?")
+"""Names of programs that compile themselves; others, such as ccache and scripts, call somebody."""
 
 
 def find_compiler() -> list[str]:
@@ -75,24 +82,50 @@ def is_zig(command: Sequence[str]) -> bool:
 
 
 def compiler_identity(command: Sequence[str]) -> str:
-    """Return a text that changes when a compiler does: its command, files, version and environment."""
+    """Return a text that changes when a compiler does: its command, files, environment, and this kind of machine.
+
+    A compiler that is called by another program, such as ccache or a script, is asked for its version as well, which
+    takes some milliseconds.
+
+    Raises
+    ------
+    BuildError
+        If there is no such program, or it cannot be started.
+    """
     program = shutil.which(command[0])
     if program is None:
         raise BuildError(
             f"There is no compiler '{command[0]}'. Remedy: check the environment variable CC or the command given."
         )
-    status = os.stat(program)
+    called = [shutil.which(word) for word in (*command, "as", "ld") if not word.startswith("-")]
+    called.append(_zig_program() if is_zig(command) else None)
+    files = tuple(_file_identity(path) for path in called if path is not None)
     variables = tuple((name, os.environ.get(name, "")) for name in IMPORTANT_VARIABLES)
-    return _identity(tuple(command), os.path.realpath(program), status.st_size, status.st_mtime_ns, variables)
+    version = b""
+    if not is_zig(command) and (sys.platform == "darwin" or not _COMPILER_ITSELF.fullmatch(Path(files[0][0]).name)):
+        # The compilers of macOS are chosen by a program in their place.
+        version = _version(tuple(command), files, variables)
+    return repr((tuple(command), sys.platform, platform.machine(), files, variables, version))
+
+
+def _zig_program() -> str | None:
+    spec = importlib.util.find_spec("ziglang")
+    places = (spec.submodule_search_locations if spec else None) or []
+    return next((str(file) for place in places for file in Path(place).glob("zig*") if file.is_file()), None)
+
+
+def _file_identity(path: str) -> tuple[str, int, int]:
+    status = os.stat(path)
+    return os.path.realpath(path), status.st_size, status.st_mtime_ns
 
 
 @functools.lru_cache(maxsize=64)
-def _identity(command: tuple[str, ...], *parts: object) -> str:
+def _version(command: tuple[str, ...], *_changes: object) -> bytes:
     try:
         done = subprocess.run([*command, "--version"], capture_output=True, stdin=subprocess.DEVNULL, check=False)
     except OSError as error:
         raise not_started(command[0], error) from error
-    return repr((command, parts, done.stdout))
+    return done.stdout
 
 
 def not_started(program: str, error: OSError) -> BuildError:

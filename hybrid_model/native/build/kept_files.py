@@ -46,23 +46,19 @@ def kept(name: str, key: str, make: Callable[[Path], None]) -> Path:
     Path
         The file, not to be changed. Other processes may delete it once it is the one unused for longest.
     """
-    found = find(name, key)
+    found = _find(name, key)
     if found is not None:
-        return found
+        return found[0]
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as scratch:
         fresh = Path(scratch).resolve() / name
         make(fresh)
         return keep(name, key, fresh.read_bytes())
 
 
-def find(name: str, key: str) -> Path | None:
-    """Return a file that was kept, or None."""
-    digest = _key_digest(name, key)
-    for folder in (_shared(digest), _Own.made()):
-        found = _found(folder, digest) if folder else None
-        if found is not None:
-            return found
-    return None
+def kept_content(name: str, key: str) -> bytes | None:
+    """Return the content of a file that was kept, or None if there is none."""
+    found = _find(name, key)
+    return None if found is None else found[1]
 
 
 def keep(name: str, key: str, content: bytes) -> Path:
@@ -74,6 +70,15 @@ def keep(name: str, key: str, content: bytes) -> Path:
         with suppress(OSError):
             return _stored(content, folder, final)
     return _stored(content, _Own.folder(), final)
+
+
+def _find(name: str, key: str) -> tuple[Path, bytes] | None:
+    digest = _key_digest(name, key)
+    for folder in (_shared(digest), _Own.made()):
+        found = _found(folder, digest) if folder else None
+        if found is not None:
+            return found
+    return None
 
 
 def _key_digest(name: str, key: str) -> str:
@@ -97,8 +102,8 @@ def _shared(digest: str) -> Path | None:
         return None
 
 
-def _found(folder: Path, digest: str) -> Path | None:
-    """Return the whole file of a key; damaged ones are deleted."""
+def _found(folder: Path, digest: str) -> tuple[Path, bytes] | None:
+    """Return the whole file of a key and its content; damaged ones are deleted."""
     try:
         names = [name for name in os.listdir(folder) if name.startswith(digest)]
     except OSError:
@@ -106,10 +111,11 @@ def _found(folder: Path, digest: str) -> Path | None:
     for path in (folder / name for name in names):
         # It may vanish at any time, and a read-only cache has no times of use.
         with suppress(OSError):
-            if is_private(path) and _digest(path.read_bytes()) == path.name.split("-")[1]:
+            content = path.read_bytes() if is_private(path) else b""
+            if _digest(content) == path.name.split("-")[1]:
                 with suppress(OSError):
                     os.utime(path)
-                return path
+                return path, content
             path.unlink()
     return None
 

@@ -6,13 +6,21 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from hybrid_model.native.build.compiler import compiler_identity, find_compiler, is_zig
 from hybrid_model.native.build.jobs import Task, run_all
 from hybrid_model.native.build.kept_files import kept
-from hybrid_model.native.build.objects import COMMON_FLAGS, GENERATED_FLAGS, digest, kept_objects
+from hybrid_model.native.build.objects import (
+    COMMON_FLAGS,
+    GENERATED_FLAGS,
+    Toolchain,
+    compile_units,
+    digest,
+    own_units,
+)
 from hybrid_model.native.engine_files import ENGINE_FOLDERS
 
 MODEL_SYMBOL = "model_of_library"
@@ -31,7 +39,8 @@ const Model *{MODEL_SYMBOL}(void)
 """
 _NETWORKS = next(folder for folder in ENGINE_FOLDERS if folder.name == "networks")
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-_MODEL_FLAGS = (*COMMON_FLAGS, *GENERATED_FLAGS)
+# A model's maps are straight lines of arithmetic: -O2 takes longer to compile them and runs them no faster.
+_MODEL_FLAGS = (*COMMON_FLAGS, *GENERATED_FLAGS, "-O1")
 
 
 def engine_library() -> Path:
@@ -47,16 +56,15 @@ def engine_library() -> Path:
     BuildError
         If there is no C compiler, or it fails.
     """
-    command, identity = _toolchain()
+    toolchain = _toolchain()
     sources = [source for folder in ENGINE_FOLDERS for source in sorted(folder.glob("*.c"))]
 
     def make(library: Path) -> None:
-        with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as name:
-            scratch = Path(name).resolve()
-            objects = kept_objects(sources, ENGINE_FOLDERS, (), command, identity, scratch)
-            _link(command, [str(file) for file in objects.values()], library, scratch, "link the engine")
+        with _folder("engine") as folder:
+            objects = _objects(sources, toolchain, folder)
+            _link(toolchain, objects, library, "link the engine")
 
-    return kept(f"engine{_SUFFIX}", repr((identity, COMMON_FLAGS, _engine_digest())), make)
+    return kept(f"engine{_SUFFIX}", repr((toolchain, COMMON_FLAGS, _engine_digest("*.[ch]"))), make)
 
 
 def model_library(source: str) -> Path:
@@ -77,41 +85,52 @@ def model_library(source: str) -> Path:
     BuildError
         If there is no C compiler, or it fails.
     """
-    command, identity = _toolchain()
-    loops = '#include "network.h"' in source
+    toolchain = _toolchain()
+    # Of the engine a network needs the loops over its tables, other models only headers.
+    loops = sorted(_NETWORKS.glob("*.c")) if '#include "network.h"' in source else []
 
     def make(library: Path) -> None:
-        with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as name:
-            scratch = Path(name).resolve()
-            (scratch / "model.c").write_text(source + _EXPORT, encoding="ascii")
-            objects = (
-                kept_objects(sorted(_NETWORKS.glob("*.c")), ENGINE_FOLDERS, (), command, identity, scratch)
-                if loops
-                else {}
-            )
+        with _folder("model") as folder:
+            objects = _objects(loops, toolchain, folder) if loops else []
+            file = folder / "model.c"
+            file.write_text(source + _EXPORT, encoding="ascii")
             # Compiled and linked by one call.
-            flags = [*_MODEL_FLAGS, *(f"-I{folder}" for folder in ENGINE_FOLDERS)]
-            inputs = [*flags, str(scratch / "model.c"), *(str(file) for file in objects.values())]
-            _link(command, inputs, library, scratch, "compile the model")
+            flags = [*_MODEL_FLAGS, *(f"-I{place}" for place in ENGINE_FOLDERS)]
+            _link(toolchain, [*flags, str(file), *objects], library, "compile the model")
 
-    # Of the engine a model has the headers, and the loops if it is a network.
-    basis = _engine_digest(sources=loops)
-    return kept(f"model{_SUFFIX}", repr((identity, _MODEL_FLAGS, basis, _EXPORT, source)), make)
+    basis = _engine_digest("*.[ch]" if loops else "*.h")
+    return kept(f"model{_SUFFIX}", repr((toolchain, _MODEL_FLAGS, basis, _EXPORT, source)), make)
 
 
-def _toolchain() -> tuple[list[str], str]:
+def _toolchain() -> Toolchain:
     command = find_compiler()
     identity = compiler_identity(command)
     # Compilers run in folders of ours: a relative path would not be found there.
-    absolute = [os.path.abspath(shutil.which(command[0]) or command[0]), *command[1:]]
+    absolute = (os.path.abspath(shutil.which(command[0]) or command[0]), *command[1:])
     # The cache may be one for several machines with processors of one kind.
-    return [*absolute, *(["-mcpu=baseline"] if is_zig(command) else [])], identity
+    return Toolchain((*absolute, *(["-mcpu=baseline"] if is_zig(command) else [])), identity)
 
 
-def _engine_digest(*, sources: bool = True) -> str:
-    return digest(file for folder in ENGINE_FOLDERS for file in sorted(folder.glob("*.[ch]" if sources else "*.h")))
+def _engine_digest(pattern: str) -> str:
+    return digest(file for folder in ENGINE_FOLDERS for file in sorted(folder.glob(pattern)))
 
 
-def _link(command: Sequence[str], inputs: Sequence[str], library: Path, scratch: Path, purpose: str) -> None:
-    strip = [] if sys.platform == "darwin" and not is_zig(command) else ["-s"]
-    run_all([Task((*command, "-shared", *strip, *inputs, "-lm", "-o", str(library)), scratch, purpose)], scratch)
+@contextmanager
+def _folder(name: str) -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as scratch:
+        folder = Path(scratch).resolve() / name
+        folder.mkdir()
+        yield folder
+
+
+def _objects(sources: Sequence[Path], toolchain: Toolchain, folder: Path) -> list[str]:
+    units = own_units(sources, ENGINE_FOLDERS, toolchain, folder)
+    compile_units(units, folder)
+    return [str(unit.file) for unit in units]
+
+
+def _link(toolchain: Toolchain, inputs: Sequence[str], library: Path, purpose: str) -> None:
+    # Apple's own linker has no such option.
+    strip = ["-s"] if sys.platform != "darwin" or is_zig(toolchain.command) else []
+    arguments = (*toolchain.command, "-shared", *strip, *inputs, "-lm", "-o", str(library))
+    run_all([Task(arguments, library.parent, purpose)], library.parent)

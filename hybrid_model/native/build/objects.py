@@ -1,78 +1,132 @@
-"""Object files of sources that seldom change: compiled as many at a time as there are processors, and kept."""
+"""Object files: compiled as many at a time as there are processors, and kept if they are worth it.
+
+The same source gives the same bytes: there is no debug information, which would hold paths, and no date is written.
+"""
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hybrid_model.native.build.jobs import Task, run_all
-from hybrid_model.native.build.kept_files import find, keep
+from hybrid_model.native.build.kept_files import keep, kept_content
 
 COMMON_FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 STRICT_FLAGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wformat=2", "-Werror")
 GENERATED_FLAGS = ("-Wall", "-Wno-unused-function", "-Wno-unused-variable", "-Wno-unused-but-set-variable")
 
 
-def kept_objects(
-    sources: Sequence[Path],
-    own_folders: Sequence[Path],
-    include_dirs: Sequence[Path],
-    command: Sequence[str],
-    identity: str,
-    scratch: Path,
-    progress: Callable[[str], None] | None = None,
-) -> dict[Path, Path]:
-    """Return the object file of each source.
+@dataclass(frozen=True)
+class Toolchain:
+    """A compiler's command with the flags for its target, and a text that changes when the compiler does."""
+
+    command: tuple[str, ...]
+    identity: str
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A source to be compiled to an object file of its name in a folder.
+
+    Attributes
+    ----------
+    source : Path
+        C file, absolute.
+    folder : Path
+        Where the object goes; the compiler runs there.
+    command : tuple of str
+        Compiler, target and flags.
+    key : str or None
+        All that the object follows from, if it is kept.
+    """
+
+    source: Path
+    folder: Path
+    command: tuple[str, ...]
+    key: str | None
+
+    @property
+    def file(self) -> Path:
+        """The object file."""
+        return self.folder / object_name(self.source)
+
+    @property
+    def task(self) -> Task:
+        """The call of the compiler."""
+        arguments = (*self.command, "-c", str(self.source), "-o", object_name(self.source))
+        return Task(arguments, self.folder, f"compile '{self.source.name}' for {self.folder.name}")
+
+
+def own_units(
+    sources: Iterable[Path],
+    header_folders: Sequence[Path],
+    toolchain: Toolchain,
+    folder: Path,
+    foreign_headers: Sequence[Path] = (),
+) -> list[Unit]:
+    """Return units of sources of this project: under strict warnings, and kept.
 
     Parameters
     ----------
-    sources : sequence of Path
-        C files of different names, held to strict warnings.
-    own_folders, include_dirs : sequence of Path
-        Folders of headers: of the project, and foreign ones.
-    command : sequence of str
-        The compiler's command, with the flags for its target.
-    identity : str
-        Changes when the compiler does.
-    scratch : Path
-        Folder for temporary files, deleted by the caller.
-    progress : callable, optional
-        Told the labels of tasks as they end.
+    sources : iterable of Path
+        C files, absolute, of different names.
+    header_folders, foreign_headers : sequence of Path
+        Folders of the headers that they may include, of this project and of others.
+    toolchain : Toolchain
+        What compiles them.
+    folder : Path
+        Where objects go.
+    """
+    # Foreign headers are system headers, so that strict warnings speak of our own code only.
+    includes = [*(f"-I{place}" for place in header_folders), *(f"-isystem{place}" for place in foreign_headers)]
+    flags = (*COMMON_FLAGS, *STRICT_FLAGS)
+    headers = digest(file for place in (*header_folders, *foreign_headers) for file in sorted(place.rglob("*.h")))
+    # Where files lie is no part of a key.
+    basis = (toolchain.identity, toolchain.command[1:], flags, headers)
+    command = (*toolchain.command, *flags, *includes)
+    return [Unit(source, folder, command, repr((*basis, digest([source])))) for source in sources]
 
-    Returns
-    -------
-    dict of Path to Path
-        Source -> object file, not to be changed.
+
+def compile_units(units: Sequence[Unit], scratch: Path, progress: Callable[[str], None] | None = None) -> None:
+    """Make object files: those that are kept are copied, the others compiled.
+
+    Parameters
+    ----------
+    units : sequence of Unit
+        In no particular order.
+    scratch : Path
+        Folder for the compiler's temporary files, deleted by the caller.
+    progress : callable, optional
+        Told in a few words what is being done.
 
     Raises
     ------
     BuildError
         If the compiler cannot be started or fails.
     """
-    # Foreign headers are system headers, so that strict warnings speak of our own code only.
-    includes = [*(f"-I{place}" for place in own_folders), *(f"-isystem{place}" for place in include_dirs)]
-    flags = [*COMMON_FLAGS, *STRICT_FLAGS]
-    headers = digest(header for folder in (*own_folders, *include_dirs) for header in sorted(folder.glob("*.h")))
-    # Paths are no part of a key: there is no debug information that would hold them.
-    keys = {source: repr((identity, flags, headers, digest([source]))) for source in sources}
-    objects = {source: find(f"{source.stem}.o", key) for source, key in keys.items()}
-    missing = [source for source, file in objects.items() if file is None]
-    tasks = [
-        Task(
-            (*command, *flags, *includes, "-c", str(source), "-o", f"./{source.stem}.o"),
-            scratch,
-            f"compile '{source.name}'",
-        )
-        for source in missing
-    ]
-    if tasks:
-        run_all(tasks, scratch, progress)
-    made = {
-        source: keep(f"{source.stem}.o", keys[source], (scratch / f"{source.stem}.o").read_bytes())
-        for source in missing
-    }
-    return {source: file if file is not None else made[source] for source, file in objects.items()}
+    missing = []
+    for unit in units:
+        known = None if unit.key is None else kept_content(unit.source.stem, unit.key)
+        if known is None:
+            missing.append(unit)
+        else:
+            unit.file.write_bytes(known)
+    if progress is not None:
+        progress(f"compiling {len(missing)} of {len(units)} C files")
+    last = {unit.folder: unit for unit in missing}
+    labels = {unit: f"compiled for {folder.name}" for folder, unit in last.items()}
+    run_all([replace(unit.task, label=labels.get(unit, "")) for unit in missing], scratch, progress)
+    for unit in missing:
+        if unit.key is not None:
+            keep(unit.source.stem, unit.key, unit.file.read_bytes())
+
+
+def object_name(source: Path) -> str:
+    """Return the name of a source's object file, relative to where the compiler runs."""
+    # With a folder, because a name may begin like an option.
+    return f"./{source.stem}.o"
 
 
 def digest(files: Iterable[Path]) -> str:
