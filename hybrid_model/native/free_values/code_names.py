@@ -8,16 +8,30 @@ their own.
 from __future__ import annotations
 
 import dis
-import itertools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from hashlib import blake2b
 from types import CodeType
 from weakref import WeakKeyDictionary
 
 _NAMES = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _FIELD = re.compile(r"\{([^{}]*)\}")
 _WORD = re.compile(r"[^\W\d]\w*")
+_FIELDS = (
+    "co_name",
+    "co_argcount",
+    "co_posonlyargcount",
+    "co_kwonlyargcount",
+    "co_flags",
+    "co_code",
+    "co_names",
+    "co_varnames",
+    "co_cellvars",
+    "co_freevars",
+    "co_exceptiontable",
+)
+"""All that decides what compiled code does, besides its constants."""
 _FOLLOWED = ("LOAD_ATTR", "LOAD_METHOD")
 _SILENT = ("PUSH_NULL", "CACHE", "EXTENDED_ARG")
 
@@ -28,8 +42,8 @@ class CodeNames:
 
     Attributes
     ----------
-    token : int
-        Equal for equal code, and for no other as long as the process lives.
+    token : bytes
+        A digest of what the code does: equal for code that is compiled again from equal lines, wherever they stand.
     lookups : mapping
         Name of a global -> names of the attributes that are taken from it at once; None if it is also used otherwise.
     words : tuple of str
@@ -38,14 +52,13 @@ class CodeNames:
         Modules that the code itself imports; with leading dots where the import is relative.
     """
 
-    token: int
+    token: bytes
     lookups: dict[str, frozenset[str] | None]
     words: tuple[str, ...]
     imports: tuple[str, ...]
 
 
 _known: WeakKeyDictionary[CodeType, CodeNames] = WeakKeyDictionary()
-_tokens = itertools.count()
 
 
 def code_names(code: CodeType) -> CodeNames:
@@ -75,7 +88,8 @@ def _looked_at(code: CodeType) -> CodeNames:
                 imports["." * (level if isinstance(level, int) else 1) + item.argval] = None
             elif item.opcode in dis.hasconst:
                 words |= dict.fromkeys(_words(item.argval))
-    return CodeNames(next(_tokens), lookups, tuple(words), tuple(imports))
+    token = blake2b(repr(_meaning(code)).encode("utf-8", "surrogatepass"), digest_size=20).digest()
+    return CodeNames(token, lookups, tuple(words), tuple(imports))
 
 
 def _with_nested(code: CodeType) -> Iterator[CodeType]:
@@ -83,6 +97,19 @@ def _with_nested(code: CodeType) -> Iterator[CodeType]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _with_nested(constant)
+
+
+def _meaning(constant: object) -> object:
+    """Return texts and numbers that say what a constant of compiled code is."""
+    if isinstance(constant, CodeType):
+        fields = (getattr(constant, name) for name in _FIELDS)
+        return ("code", *fields, *map(_meaning, constant.co_consts))
+    if isinstance(constant, tuple):
+        return ("tuple", *map(_meaning, constant))
+    if isinstance(constant, frozenset):
+        return ("frozenset", *sorted(repr(_meaning(item)) for item in constant))
+    # The digits of a number are limited.
+    return ("number", hex(constant)) if type(constant) is int else (type(constant).__name__, constant)
 
 
 def _words(constant: object) -> Iterator[str]:

@@ -19,6 +19,8 @@ from hybrid_model.native.free_values import known
 from hybrid_model.native.free_values.code_names import code_names
 from hybrid_model.native.free_values.watch import MISSING, Watch
 
+MOST = 5_000
+"""Functions that are followed; maps that can reach more use a library that is not known here."""
 _LEAVES = frozenset((type(None), bool, int, float, complex, str, bytes, type(Ellipsis), type(NotImplemented), range))
 """Types whose values say all about themselves."""
 _VALUES_READ = ("variables", "of_kind", "__dict__")
@@ -62,6 +64,7 @@ class Reading:
         self.watch = Watch()
         self.open: deque[object] = deque()
         self.start_values = False
+        self._followed = 0
         self._numbers: dict[int, int] = {}
         self._held: list[object] = []
         self._words: set[str] = set(known.framework_words())
@@ -73,11 +76,6 @@ class Reading:
         self._orders: list[tuple[int, list[str]]] = []
         self._making: dict[int, list[tuple[int, str, object]]] = {}
         self._made: set[int] = set()
-
-    @property
-    def size(self) -> int:
-        """Number of the objects met."""
-        return len(self._held)
 
     # Values in records.
 
@@ -194,6 +192,9 @@ class Reading:
 
     def code(self, number: int, code: CodeType, where: dict[str, Any]) -> None:
         """Follow what the code of function `number` names, with the globals that it was made with."""
+        self._followed += 1
+        if self._followed > MOST:
+            raise UntoldError(f"a map can reach more than {MOST} functions")
         self.record(number, "globals", self._number_of(where))
         names = code_names(code)
         for word in names.words:

@@ -14,9 +14,6 @@ from hybrid_model.native.free_values.containers import content
 from hybrid_model.native.free_values.objects import describe
 from hybrid_model.native.free_values.reading import Reading, UntoldError
 
-MOST = 50_000
-"""Objects that are looked at; with more, a comparison costs as much as a trace."""
-
 
 class Snapshot:
     """What the maps of an automaton read besides their argument, as it was when the snapshot was taken.
@@ -116,8 +113,6 @@ def _reading(automaton: Automaton) -> Reading:
     reading.records.append(reading.token(automaton))
     variables: list[Variable] = []
     while reading.open:
-        if reading.size > MOST:
-            raise UntoldError(f"maps can read more than {MOST} objects")
         value = reading.open.popleft()
         describe(reading, value)
         if isinstance(value, Variable):
