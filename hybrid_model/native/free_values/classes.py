@@ -52,7 +52,7 @@ def describe_class(reading: Reading, number: int, cls: type) -> None:
         raise UntoldError(f"a map reads the class {cls.__module__}.{cls.__qualname__}")
     reading.watch.of_class(cls)
     bases = map(reading.reference, cls.__mro__[1:])
-    reading.record(number, "class", cls.__name__, reading.reference(type(cls)), *bases)
+    reading.record(number, "class", cls.__name__, cls.__qualname__, reading.reference(type(cls)), *bases)
     making: list[tuple[str, object]] = []
     for name, held in vars(cls).items():
         if name in _MAKING or isinstance(held, ClassAttribute | Clock):

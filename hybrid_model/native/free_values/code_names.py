@@ -33,6 +33,7 @@ _FIELDS = (
 )
 """All that decides what compiled code does, besides its constants."""
 _FOLLOWED = ("LOAD_ATTR", "LOAD_METHOD")
+_LOOKUPS = ("LOAD_GLOBAL", "LOAD_NAME", "LOAD_FROM_DICT_OR_GLOBALS")
 _SILENT = ("PUSH_NULL", "CACHE", "EXTENDED_ARG")
 
 
@@ -77,7 +78,7 @@ def _looked_at(code: CodeType) -> CodeNames:
         words |= dict.fromkeys(one.co_names)
         instructions = [item for item in dis.get_instructions(one) if item.opname not in _SILENT]
         for before, item, after in zip([None, *instructions], instructions, [*instructions[1:], None], strict=False):
-            if item.opname in ("LOAD_GLOBAL", "LOAD_NAME"):
+            if item.opname in _LOOKUPS:
                 taken = after.argval if after is not None and after.opname in _FOLLOWED else None
                 known = lookups.get(item.argval, frozenset())
                 lookups[item.argval] = None if known is None or taken is None else known | {taken}
@@ -86,6 +87,8 @@ def _looked_at(code: CodeType) -> CodeNames:
                 index = instructions.index(item)
                 level = instructions[index - 2].argval if before is not None and index > 1 else 0
                 imports["." * (level if isinstance(level, int) else 1) + item.argval] = None
+            elif item.opname == "MATCH_CLASS":
+                words["isinstance"] = None
             elif item.opcode in dis.hasconst:
                 words |= dict.fromkeys(_words(item.argval))
     token = blake2b(repr(_meaning(code)).encode("utf-8", "surrogatepass"), digest_size=20).digest()

@@ -94,6 +94,13 @@ def is_of_known_module(function: FunctionType) -> bool:
     return is_known_module(name) and module is not None and vars(module) is function.__globals__
 
 
+def needs_no_look(value: object) -> bool:
+    """Whether what a known module has by a name is its own, and not what somebody else has put there."""
+    if isinstance(value, FunctionType):
+        return is_of_known_module(value) and not value.__closure__
+    return is_known_ufunc(value) if isinstance(value, np.ufunc) else is_known(value)
+
+
 def is_known_ufunc(ufunc: np.ufunc) -> bool:
     """Whether an element-wise function is one of numpy or scipy; one of `np.frompyfunc` holds another function."""
     return any(getattr(module, ufunc.__name__, None) is ufunc for module in (np, special))

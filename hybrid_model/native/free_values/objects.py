@@ -155,12 +155,14 @@ def _function(reading: Reading, number: int, value: types.FunctionType) -> None:
         if value.__name__ in known.OUTSIDE:
             raise UntoldError(f"a map calls {value.__module__}.{value.__name__}")
         reading.known_code(value)
-        if not (value.__closure__ or value.__defaults__ or value.__kwdefaults__ or vars(value)):
+        if not (value.__closure__ or value.__defaults__ or value.__kwdefaults__):
             reading.record(number, "known function", token)
             return
     reading.watch.function(value)
-    parts = (value.__defaults__, value.__kwdefaults__, tuple(vars(value).items()), value.__closure__)
-    reading.record(number, "function", token, value.__name__, *reading.tokens(parts))
+    keywords = tuple((value.__kwdefaults__ or {}).items())
+    parts = reading.tokens((value.__defaults__, keywords, value.__closure__))
+    reading.record(number, "function", token, value.__name__, *parts)
+    reading.attributes(number, vars(value))
     if not is_known:
         reading.code(number, value.__code__, value.__globals__)
 

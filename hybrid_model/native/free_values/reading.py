@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from abc import ABCMeta, get_cache_token
 from collections import deque
 from collections.abc import Iterable, Mapping
 from types import CodeType, ModuleType
@@ -27,8 +28,9 @@ _VALUES_READ = ("variables", "of_kind", "__dict__")
 """Words by which a map gets at start values, which are data otherwise."""
 _TAKING_NAMES = ("__dict__", "__getattribute__", "attrgetter", "methodcaller")
 """Words by which code gets at attributes that it does not name."""
-_UNTOLD = ("__globals__", "__builtins__", "__subclasses__", "__annotations__", "__doc__")
+_UNTOLD = ("__globals__", "__builtins__", "__subclasses__", "__annotations__", "__doc__", "get_type_hints")
 """Words by which code gets at what is not looked at."""
+_ASKING = ("isinstance", "issubclass")
 _ITS_CLASS = "__class__"
 _HIDDEN = frozenset(
     {"__module__", "__doc__", "__dict__", "__weakref__", "__slots__", "__annotations__", "__qualname__", "_abc_impl"}
@@ -69,7 +71,7 @@ class Reading:
         self._held: list[object] = []
         self._words: set[str] = set(known.framework_words())
         self._own_words: set[str] = set()
-        self._every_word = self._bare_arrays = False
+        self._every_word = self._bare_arrays = self._abstract = False
         self._waiting: dict[str, list[tuple[int, object]]] = {}
         self._modules: list[ModuleType] = []
         self._resolved: set[tuple[int, str]] = set()
@@ -177,8 +179,10 @@ class Reading:
             self.start_values = True
         if known.takes_apart(value):
             self.every_word()
+            self.word("__dataclass_fields__")
 
     def _make(self, cls: type) -> None:
+        self._abstract = self._abstract or isinstance(cls, ABCMeta)
         for base in cls.__mro__:
             if id(base) not in self._made:
                 self._made.add(id(base))
@@ -223,6 +227,9 @@ class Reading:
         """Watch names of modules that do not exist yet; refuse what is known at the end only."""
         if self._bare_arrays and not self._own_words.isdisjoint(known.OUTSIDE):
             raise UntoldError("a map may read random numbers or a file by numpy")
+        if self._abstract and not self._own_words.isdisjoint(_ASKING):
+            self.watch.kinship()
+            self.records.append(("kinship", str(get_cache_token())))
         if self._every_word:
             self.records += [("order", owner, *names) for owner, names in self._orders]
         for module in self._modules:
@@ -266,15 +273,13 @@ class Reading:
             if known.is_of_arrays(module.__name__) and name in known.OUTSIDE:
                 raise UntoldError(f"a map reads {module.__name__}.{name}")
             self.known_code(here.get(name))
-            if not isinstance(here.get(name), ModuleType):
-                return
         if (id(here), name) in self._resolved:
             return
         self._resolved.add((id(here), name))
         # A module may make what is asked for.
         found = name if name in here else "__getattr__"
         self.watch.names(here, (name, found))
-        if found in here:
+        if found in here and not (known.is_known_module(module.__name__) and known.needs_no_look(here[found])):
             self.records.append(("of module", self._number_of(here), name, found, self.token(here[found])))
 
     def _import(self, name: str, where: dict[str, Any]) -> None:

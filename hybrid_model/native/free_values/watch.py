@@ -6,6 +6,7 @@ of its own. In doubt something has changed: an equal value in a new object count
 
 from __future__ import annotations
 
+import abc
 from collections.abc import Callable, Iterable, Mapping
 from itertools import chain
 from operator import attrgetter, is_
@@ -20,7 +21,7 @@ MISSING = object()
 Array = np.ndarray[Any, Any]
 
 _parts_of_function = attrgetter("__code__", "__name__", "__defaults__", "__kwdefaults__")
-_order_of_bases = attrgetter("__mro__")
+_parts_of_class = attrgetter("__mro__", "__name__", "__qualname__")
 
 
 class Watch:
@@ -35,6 +36,7 @@ class Watch:
         self._lookups: list[tuple[Mapping[str, Any], tuple[str, ...]]] = []
         self._contents: list[tuple[Callable[[Any], tuple[Any, ...]], Any]] = []
         self._arrays: list[tuple[Array, Any, tuple[int, ...], bytes]] = []
+        self._kinship: object = None
         self._sizes: list[int] = []
         self._then: list[tuple[Any, ...]] = []
 
@@ -55,7 +57,7 @@ class Watch:
 
     def array(self, value: Array) -> None:
         """Watch the content of an array of numbers."""
-        self._arrays.append((value, value.dtype, value.shape, value.tobytes()))
+        self._arrays.append((value, value.dtype, value.shape, np.ndarray.tobytes(value)))
 
     def function(self, value: FunctionType) -> None:
         """Watch the code of a function, its name, its defaults and its attributes."""
@@ -65,7 +67,7 @@ class Watch:
             self._dictionaries.append(value.__kwdefaults__)
 
     def of_class(self, value: type) -> None:
-        """Watch all attributes of a class, and its bases."""
+        """Watch all attributes of a class, its name and its bases."""
         self._classes.append(value)
 
     def cell(self, value: CellType) -> None:
@@ -76,6 +78,10 @@ class Watch:
         """Watch what names stand for in a dictionary, such as that of a module."""
         self._lookups.append((where, tuple(names)))
 
+    def kinship(self) -> None:
+        """Watch which classes count as derived from abstract ones without being so."""
+        self._kinship = abc.get_cache_token()
+
     def close(self) -> None:
         """Note what everything is now."""
         self._sizes = self._sizes_now()
@@ -85,7 +91,8 @@ class Watch:
         """Whether everything is what it was."""
         # Where all sizes are what they were, `map` leaves nothing out.
         return (
-            self._sizes_now() == self._sizes
+            self._kinship in (None, abc.get_cache_token())
+            and self._sizes_now() == self._sizes
             and all(all(map(is_, now, then)) for now, then in zip(self._now(), self._then, strict=True))
             and all(_is_content(*array) for array in self._arrays)
         )
@@ -101,7 +108,7 @@ class Watch:
             map(type, self._objects),
             chain.from_iterable(map(dict.__iter__, self._dictionaries)),
             chain.from_iterable(map(dict.values, self._dictionaries)),
-            map(_order_of_bases, self._classes),
+            chain.from_iterable(map(_parts_of_class, self._classes)),
             chain.from_iterable(bodies),
             chain.from_iterable([body.values() for body in bodies]),
             chain.from_iterable(map(_parts_of_function, self._functions)),
@@ -112,7 +119,7 @@ class Watch:
 
 
 def _is_content(array: Array, dtype: Any, shape: tuple[int, ...], content: bytes) -> bool:
-    return array.shape == shape and array.dtype == dtype and array.tobytes() == content
+    return array.shape == shape and array.dtype == dtype and np.ndarray.tobytes(array) == content
 
 
 def _content_of_cell(cell: CellType) -> Any:

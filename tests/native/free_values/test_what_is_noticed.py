@@ -2,9 +2,11 @@
 
 import textwrap
 
+import numpy as np
 import pytest
 from notebook import Notebook
 
+import hybrid_model as hm
 from hybrid_model.native.free_values.snapshots import snapshot
 from hybrid_model.native.trace import trace
 
@@ -298,10 +300,96 @@ NOTICED = {
     ),
     "whether two objects are one": ("a = [1.0]\nb = a", "", "-9.81 if a is b else -1.62", "b = [1.0]"),
     "another type of number": ("G = 2", "", "-G // 0.75 * isinstance(G, int)", "G = 2.0"),
+    "a constant put into numpy": ("np.G = 9.81", "", "-np.G", "np.G = 1.62"),
+    "an array put into numpy": ("np.G = np.array([9.81])", "", "-np.G[0]", "np.G[0] = 1.62"),
+    "a function of the framework that is replaced": (
+        "first = hm.least",
+        "",
+        "-hm.least(9.81, 1.62)",
+        "hm.least = lambda *margins: 3.0",
+    ),
+    "a class that is registered with an abstract one": (
+        "import abc\nclass Heavy(abc.ABC): pass\nclass Planet: pass\nplanet = Planet()",
+        "",
+        "-9.81 if isinstance(planet, Heavy) else -1.62",
+        "Heavy.register(Planet)",
+    ),
+    "what a field of a dataclass says": (
+        """
+        import dataclasses
+        def planet(g):
+            @dataclasses.dataclass
+            class Planet:
+                mass: float = dataclasses.field(default=1.0, metadata={"g": g})
+            return Planet
+        Planet = planet(9.81)
+        """,
+        "",
+        "-dataclasses.fields(Planet)[0].metadata['g']",
+        "Planet = planet(1.62)",
+    ),
+    "the name of a function": (
+        "TABLE = {'earth': 9.81, 'moon': 1.62}\ndef fall(): pass\nfall.__name__ = 'earth'",
+        "",
+        "-TABLE[fall.__name__]",
+        "fall.__name__ = 'moon'",
+    ),
+    "the name of a class": (
+        "TABLE = {'Earth': 9.81, 'Moon': 1.62}\nclass Earth: pass",
+        "",
+        "-TABLE[Earth.__name__]",
+        "Earth.__name__ = 'Moon'",
+    ),
+    "the order of attributes": (
+        "class Bag: pass\nbag = Bag()\nbag.a = 9.81\nbag.b = 1.62",
+        "",
+        "-list(vars(bag).values())[0]",
+        "del bag.a\nbag.a = 9.81",
+    ),
+    "the order of a dictionary": (
+        "bag = {'a': 9.81, 'b': 1.62}",
+        "",
+        "-list(bag.values())[0]",
+        "bag['a'] = bag.pop('a')",
+    ),
+    "what a context manager reads": (
+        "import contextlib\nG = 9.81\n@contextlib.contextmanager\ndef planet(): yield G\n"
+        "def fall():\n    with planet() as g: return g",
+        "",
+        "-fall()",
+        "G = 1.62",
+    ),
+    "what a generator function reads": ("G = 9.81\ndef fall(): yield G", "", "-sum(fall())", "G = 1.62"),
+    "a global read by a class made in the map": (
+        "G = 9.81\ndef fall():\n    class Planet:\n        g = G\n    return Planet.g",
+        "",
+        "-fall()",
+        "G = 1.62",
+    ),
+    "a map of another automaton": (
+        """
+        G = 9.81
+        class Inner(hm.HybridAutomaton):
+            v = hm.State(0.0)
+            def flow_map(self, s): return {"v": -G * s.v}
+        inner = Inner()
+        """,
+        "",
+        "inner.derivatives(s)['v']",
+        "G = 1.62",
+    ),
     "the sign of zero": ("G = 0.0", "", "-9.81 * np.copysign(1.0, G)", "G = -0.0"),
 }
 
 
+@pytest.fixture
+def restored(monkeypatch):
+    """Put back what cases change in modules."""
+    monkeypatch.setattr(hm, "least", hm.least)
+    monkeypatch.setattr(np, "G", 0.0, raising=False)
+
+
+@pytest.mark.usefixtures("restored")
 @pytest.mark.parametrize("case", NOTICED)
 def test_what_changes_a_trace_changes_the_snapshot(case):
     before, body, rate, change = NOTICED[case]
@@ -364,6 +452,17 @@ UNTOLD = {
         "-fall()",
     ),
     "a function made by numpy": ("fall = np.frompyfunc(lambda a: a, 1, 1)", "", "-fall(9.81)"),
+    "a module by its name": ("import importlib", "", "-importlib.import_module('math').pi"),
+    "a module out of the list of all": ("import sys", "", "-sys.modules['math'].pi"),
+    "the globals of a function": ("G = 9.81\ndef fall(): pass", "", "-fall.__globals__['G']"),
+    "annotations": ("class Planet:\n    g: 9.81", "", "-Planet.__annotations__['g']"),
+    "a weak reference": ("import weakref\nclass P:\n    g = 1.0\np = P()\nr = weakref.ref(p)", "", "-r().g"),
+    "a context variable": ("import contextvars\nG = contextvars.ContextVar('G', default=9.81)", "", "-G.get()"),
+    "a computed name in a module": (
+        "import types\nconfig = types.ModuleType('config')\nconfig.G = 9.81",
+        "",
+        "-getattr(config, 'G')",
+    ),
     "an environment variable": ("import os", "", "-float(os.environ['GRAVITY'])"),
 }
 
