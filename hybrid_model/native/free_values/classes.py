@@ -28,12 +28,15 @@ _OF_C = (WrapperDescriptorType, MethodDescriptorType, ClassMethodDescriptorType,
 
 
 class _Traits(NamedTuple):
-    """What can be said of a class: whether it is known, whether all state of an instance can be seen, whether code that
-    is not looked at may read any attribute.
+    """What can be said of a class.
+
+    It is `known`; all state of an instance can be seen, as it is `plain`; an instance is `fixed`, being one of a frozen
+    class of the framework; any attribute may be `read` by code that is not looked at.
     """
 
     known: bool
     plain: bool
+    fixed: bool
     read: bool
 
 
@@ -71,7 +74,8 @@ def describe_instance(reading: Reading, number: int, value: Any) -> None:
     traits = _traits(cls)
     if not traits.plain:
         raise UntoldError(f"a map reads a value of the class {cls.__module__}.{cls.__qualname__}")
-    reading.watch.instance(value)
+    if not traits.fixed:
+        reading.watch.instance(value)
     reading.record(number, "instance", reading.reference(cls), *_content_of(reading, value))
     slots = slots_of(value)
     if slots:
@@ -98,7 +102,9 @@ def _traits(cls: type) -> _Traits:
     bases = cls.__mro__[1:]
     if found is not None and found[0]() is cls and len(found[1]) == len(bases) and all(map(is_, found[1], bases)):
         return found[2]
-    traits = _Traits(known.is_known(cls), _is_plain(cls), known.has_reading_base(cls))
+    is_known = known.is_known(cls)
+    is_fixed = is_known and getattr(vars(cls).get("__dataclass_params__"), "frozen", False)
+    traits = _Traits(is_known, _is_plain(cls), is_fixed, known.has_reading_base(cls))
     key = id(cls)
     _found[key] = weakref.ref(cls, lambda _: _found.pop(key, None)), bases, traits
     return traits

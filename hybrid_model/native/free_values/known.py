@@ -37,6 +37,8 @@ _FRAMEWORK = (
     MinimumDwell,
 )
 """Classes whose code reads attributes of automata."""
+_FOR_COPIES = "made_from"
+"""Attribute that holds matrices for copies to be made from; no map reads it."""
 _AUTHORS = ("consensus", "models")
 """Rooms of ours that write automata as users do."""
 _OF_MAPS = ("hybrid_model.declare", "hybrid_model.errors")
@@ -150,4 +152,4 @@ def framework_words() -> frozenset[str]:
         found.update(vars(cls), inspect.get_annotations(cls))
         for function in filter(inspect.isfunction, vars(cls).values()):
             found.update(item.argval for item in dis.get_instructions(function) if item.opname == "STORE_ATTR")
-    return frozenset(word for word in found if not word.startswith(("__", "_abc")))
+    return frozenset(word for word in found - {_FOR_COPIES} if not word.startswith(("__", "_abc")))

@@ -20,7 +20,8 @@ MISSING = object()
 
 Array = np.ndarray[Any, Any]
 
-_parts_of_function = attrgetter("__code__", "__name__", "__defaults__", "__kwdefaults__")
+_attributes_of = attrgetter("__dict__")
+_parts_of_function = attrgetter("__code__", "__name__", "__defaults__", "__kwdefaults__", "__dict__")
 _parts_of_class = attrgetter("__mro__", "__name__", "__qualname__")
 
 
@@ -29,6 +30,7 @@ class Watch:
 
     def __init__(self) -> None:
         self._objects: list[object] = []
+        self._owners: list[object] = []
         self._dictionaries: list[dict[Any, Any]] = []
         self._functions: list[FunctionType] = []
         self._classes: list[type] = []
@@ -45,6 +47,7 @@ class Watch:
         self._objects.append(value)
         attributes = getattr(value, "__dict__", None)
         if isinstance(attributes, dict):
+            self._owners.append(value)
             self._dictionaries.append(attributes)
 
     def dictionary(self, value: dict[Any, Any]) -> None:
@@ -106,6 +109,7 @@ class Watch:
         bodies = [vars(cls) for cls in self._classes]
         return [
             map(type, self._objects),
+            map(_attributes_of, self._owners),
             chain.from_iterable(map(dict.__iter__, self._dictionaries)),
             chain.from_iterable(map(dict.values, self._dictionaries)),
             chain.from_iterable(map(_parts_of_class, self._classes)),

@@ -14,7 +14,10 @@ from notebook import Notebook
 
 import hybrid_model as hm
 from hybrid_model.consensus import closed_loop, load_scenario
+from hybrid_model.consensus.weights.function import FunctionWeight
+from hybrid_model.consensus.weights.kinds import weights_block
 from hybrid_model.declare.dwell import MinimumDwell
+from hybrid_model.declare.state_space import state_space
 from hybrid_model.models import BouncingBall, Fireflies, RestingBall, SwitchedFeedback, Thermostat
 from hybrid_model.native.free_values.snapshots import current, snapshot, why_untold
 
@@ -195,6 +198,34 @@ def test_a_method_of_the_library_that_is_replaced(monkeypatch):
 def test_an_instance_attribute_of_a_library_model():
     ball = RestingBall()
     assert changed(ball, lambda: setattr(ball, "mode_names", ("up", "down")))
+
+
+def test_a_weight_that_is_a_function_of_time():
+    notebook = Notebook("level = [2.0]\ndef weight(t): return level[0] + np.sin(t)")
+    weights = weights_block([FunctionWeight(notebook["weight"])])
+    assert changed(weights, lambda: notebook.run("level[0] = 3.0"))
+
+
+def test_an_automaton_that_is_no_hybrid_automaton():
+    notebook = Notebook(
+        BLOCK,
+        """
+        from hybrid_model.declare.wrapper import Wrapper
+        G = 1.0
+        class Faster(Wrapper):
+            def derivatives(self, s):
+                return {name: G * rate for name, rate in super().derivatives(s).items()}
+        faster = Faster(Block())
+        """,
+    )
+    assert changed(notebook["faster"], lambda: notebook.run("G = 2.0"))
+
+
+def test_a_system_of_matrices_shares_its_key_with_others_of_its_shape():
+    def system(gain):
+        return state_space([[gain]], [[1.0]], [[1.0]], inputs=["u"], outputs=["y"])
+
+    assert key(system(-1.0)) == key(system(-2.0))
 
 
 # Modules.

@@ -125,6 +125,18 @@ NOTICED = {
         "-planet.g",
         "planet.__class__ = Moon",
     ),
+    "a new dictionary of the instance": (
+        "",
+        "",
+        "-vars(self).get('g', 9.81)",
+        "ball.__dict__ = {**vars(ball), 'g': 1.62}",
+    ),
+    "a new dictionary of a function": (
+        "def fall(): return fall.g\nfall.g = 9.81",
+        "",
+        "-fall()",
+        "fall.__dict__ = {'g': 1.62}",
+    ),
     "a namespace": ("import types\nG = types.SimpleNamespace(g=9.81)", "", "-G.g", "G.g = 1.62"),
     "a dataclass": (
         "from dataclasses import dataclass\n@dataclass\nclass Planet:\n    g: float = 9.81\nplanet = Planet()",
