@@ -51,14 +51,14 @@ def describe_class(reading: Reading, number: int, cls: type) -> None:
         reading.known_code(cls)
         reading.record(number, "known class", cls.__module__, cls.__qualname__)
         return
-    if not _is_of_python(cls):
+    if not made_in_python(cls):
         raise UntoldError(f"a map reads the class {cls.__module__}.{cls.__qualname__}")
     reading.watch.of_class(cls)
     bases = map(reading.reference, cls.__mro__[1:])
     reading.record(number, "class", cls.__name__, cls.__qualname__, reading.reference(type(cls)), *bases)
     making: list[tuple[str, object]] = []
     for name, held in vars(cls).items():
-        if name in _MAKING or isinstance(held, ClassAttribute | Clock):
+        if name in _MAKING or issubclass(type(held), (ClassAttribute, Clock)):
             making.append((name, held))
         else:
             # Operators and the like are read without a name.
@@ -89,11 +89,13 @@ def describe_instance(reading: Reading, number: int, value: Any) -> None:
 def _content_of(reading: Reading, value: Any) -> list[object]:
     """Return tokens of what an instance of a subclass holds as a container, array, number or text."""
     for kind, items in CONTAINERS.items():
-        if isinstance(value, kind):
+        if issubclass(type(value), kind):
             return [kind.__name__, *items_of(reading, items, value)]
-    if isinstance(value, np.ndarray):
+    if issubclass(type(value), np.ndarray):
         return content(reading, value)
-    simple: Callable[[Any], str] | None = next((kind.__repr__ for kind in _SIMPLE if isinstance(value, kind)), None)
+    simple: Callable[[Any], str] | None = next(
+        (kind.__repr__ for kind in _SIMPLE if issubclass(type(value), kind)), None
+    )
     return [] if simple is None else [simple(value)]
 
 
@@ -113,13 +115,21 @@ def _traits(cls: type) -> _Traits:
 def _is_plain(cls: type) -> bool:
     """Whether all state of an instance is in its attributes and in what containers of Python hold."""
     while cls not in _ROOTS:
-        if not _is_of_python(cls):
+        if not made_in_python(cls) or not _shows_attributes(cls):
             return False
         cls = cls.__base__ or object
     return True
 
 
-def _is_of_python(cls: type) -> bool:
+def _shows_attributes(cls: type) -> bool:
+    """Whether the attributes of an instance are those in its dictionary and slots, and no method is in the way."""
+    body = vars(cls)
+    return "__getattribute__" not in body and (
+        "__dict__" not in body or isinstance(body["__dict__"], GetSetDescriptorType)
+    )
+
+
+def made_in_python(cls: type) -> bool:
     """Whether a class was written in Python: those written in C have methods in C, and room for state of their own."""
     if not cls.__flags__ & _MADE_AT_RUN_TIME:
         return False

@@ -15,7 +15,7 @@ import numpy as np
 
 from hybrid_model.declare.variables import Variable
 from hybrid_model.native.free_values import known
-from hybrid_model.native.free_values.classes import describe_class, describe_instance
+from hybrid_model.native.free_values.classes import describe_class, describe_instance, made_in_python
 from hybrid_model.native.free_values.code_names import code_names
 from hybrid_model.native.free_values.containers import CONTAINERS, content, items_of
 from hybrid_model.native.free_values.reading import Reading, UntoldError
@@ -35,24 +35,25 @@ def describe(reading: Reading, value: Any) -> None:
     UntoldError
         If its state cannot be compared.
     """
+    # `type` and not `isinstance`: that asks the object, which may be anything.
     number, kind = reading.number(value), type(value)
     special = _KINDS.get(kind)
     if special is not None:
         special(reading, number, value)
     elif kind in CONTAINERS:
         reading.record(number, kind.__name__, *items_of(reading, CONTAINERS[kind], value))
-    elif isinstance(value, type):
+    elif issubclass(kind, type):
         describe_class(reading, number, value)
-    elif isinstance(value, np.ufunc):
+    elif issubclass(kind, np.ufunc):
         _ufunc(reading, number, value)
-    elif isinstance(value, np.generic):
+    elif issubclass(kind, np.generic):
         _number(reading, number, value)
-    elif isinstance(value, np.dtype):
+    elif issubclass(kind, np.dtype):
         reading.record(number, "dtype", str(value.descr))
-    elif callable(value) and known.is_known(value):
+    elif not made_in_python(kind) and callable(value) and known.is_known(value):
         reading.known_code(value)
         reading.record(number, "known", value.__module__, value.__qualname__)
-    elif isinstance(value, enum.Enum) and known.is_known(kind):
+    elif issubclass(kind, enum.Enum) and known.is_known(kind):
         reading.record(number, "member", kind.__qualname__, value.name)
     else:
         describe_instance(reading, number, value)

@@ -14,7 +14,7 @@ from abc import ABCMeta, get_cache_token
 from collections import deque
 from collections.abc import Iterable, Mapping
 from types import CodeType, ModuleType
-from typing import Any
+from typing import Any, cast
 
 from hybrid_model.native.free_values import known
 from hybrid_model.native.free_values.code_names import code_names
@@ -91,10 +91,10 @@ class Reading:
         if kind in _LEAVES:
             # The digits of a number are limited.
             return hex(value).encode() if isinstance(value, int) and abs(value) > _LARGE else value
-        if isinstance(value, tuple) and kind is tuple:
+        if kind is tuple and isinstance(value, tuple):
             return ("tuple", *map(self.token, value))
-        if isinstance(value, type):
-            self._make(value)
+        if issubclass(kind, type):
+            self._make(cast(type, value))
         return self.reference(value)
 
     def tokens(self, values: Iterable[object]) -> list[object]:
@@ -253,7 +253,7 @@ class Reading:
             self.records.append(("global", self._number_of(where), name, shown))
         elif value is not MISSING and attributes is None:
             self.token(value)
-        if isinstance(value, ModuleType) and attributes is not None:
+        if attributes is not None and isinstance(value, ModuleType):
             for attribute in attributes:
                 self._attribute_of_module(value, attribute)
 

@@ -115,7 +115,7 @@ def _reading(automaton: Automaton) -> Reading:
     while reading.open:
         value = reading.open.popleft()
         describe(reading, value)
-        if isinstance(value, Variable):
+        if type(value) is Variable:
             variables.append(value)
     if reading.start_values:
         for variable in variables:

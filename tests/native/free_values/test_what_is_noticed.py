@@ -475,6 +475,21 @@ UNTOLD = {
         "",
         "-getattr(config, 'G')",
     ),
+    "an object that computes its attributes": (
+        "class P:\n    def __getattribute__(self, name): return 1.0\np = P()",
+        "",
+        "-p.g",
+    ),
+    "a stand-in for another object": (
+        "import weakref\nclass P:\n    g = 1.0\nown = P()\np = weakref.proxy(own)",
+        "",
+        "-p.g",
+    ),
+    "a stand-in for an object that is gone": (
+        "import weakref\nclass P:\n    g = 1.0\np = weakref.proxy(P())",
+        "",
+        "-p.g",
+    ),
     "an environment variable": ("import os", "", "-float(os.environ['GRAVITY'])"),
 }
 
