@@ -156,3 +156,7 @@ def moves(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
     k = np.arange(len(sizes))
     weights = 1.0 - 0.5 * np.mod(k * 0.6180339887498949, 1.0)
     return BORDER * sizes * weights, BORDER * sizes * weights * np.where(k % 2 == 0, 1.0, -1.0)
+RETAINED = 0.45
+HALVINGS_LEAST = 6
+HALVINGS_MOST = 40
+AWAY = (8.0, 64.0, 512.0)
