@@ -66,11 +66,35 @@ CHATTER = 1000.0
 PAUSE = 1e-4
 """A gap that is below this part of the one before does not continue it: what was before is a pause."""
 
+SLIDING_AFTER = 500
+"""After so many steps of a run it is looked whether it chatters: whether none leads away from a jump of its rates."""
+SLIDING_LOOKS = 100
+SLIDING_FOUND = 10
+"""Then after each of so many steps; so many of these looks must find a jump to which the flow leads back."""
+SLIDING_LEFT = 1e4
+"""But a run that needs fewer steps than this at its present pace is let go on."""
+SLIDING_AHEAD = 8.0
+"""Jumps of the rates are looked for so many steps ahead, since the next steps are the shorter the nearer they are."""
+RETAINED = 0.45
+"""Of a change of a rate over a distance, at least this part stays with each halving if it is a jump; on the very
+surface the rate may be half of it, as with a sign of zero."""
+HALVINGS_LEAST = 6
+HALVINGS_MOST = 40
+"""So many halvings tell a jump; more than the most would find steep places of smooth maps that no step sees."""
+AWAY = (8.0, 64.0, 512.0)
+"""On both sides of a jump it is looked where the flow leads in the time of so many of the last halves."""
+PACE_STEPS = 2000
+"""The pace of a flow is looked at after so many steps each."""
+MOST_STEPS = 1e7
+"""A flow that would need more steps than this at its present pace is given up: no run lasts that long."""
+
 _IN_MODELS = (
     *("roundings", "instant", "instant_in_gap", "border", "absolute", "rounding_level", "unknown", "probe"),
     *("probe_parts", "steady"),
     *("overshoot", "jumps_at_once", "jumps_in_window", "accumulation", "spread", "crowd", "resolved", "chatter"),
     *("pause", "euler_part", "blind_part", "first_growth", "first_least", "reach_step", "reach_at"),
+    *("sliding_after", "sliding_looks", "sliding_found", "sliding_left", "sliding_ahead", "retained"),
+    *("halvings_least", "halvings_most", "away", "pace_steps", "most_steps"),
 )
 
 
@@ -156,7 +180,3 @@ def moves(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
     k = np.arange(len(sizes))
     weights = 1.0 - 0.5 * np.mod(k * 0.6180339887498949, 1.0)
     return BORDER * sizes * weights, BORDER * sizes * weights * np.where(k % 2 == 0, 1.0, -1.0)
-RETAINED = 0.45
-HALVINGS_LEAST = 6
-HALVINGS_MOST = 40
-AWAY = (8.0, 64.0, 512.0)

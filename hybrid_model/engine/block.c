@@ -20,16 +20,16 @@ static void *take(Cursor *cursor, size_t size)
 
 static size_t point_length(const Model *m)
 {
-    return 2 + m->n_states + m->n_discrete + m->n_margins + 1 + m->n_states;
+    return 2 + m->n_states + m->n_discrete + m->n_margins + 1 + m->n_states + N_PROGRESS;
 }
 
 static Point take_point(Cursor *cursor, const Model *m)
 {
     double *values = take(cursor, point_length(m) * sizeof(double));
     if (!values)
-        return (Point){NULL, NULL, NULL, NULL, NULL, NULL};
-    double *x = values + 2, *z = x + m->n_states, *level = z + m->n_discrete;
-    return (Point){values, values + 1, x, z, level, level + m->n_margins + 1};
+        return (Point){NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    double *x = values + 2, *z = x + m->n_states, *level = z + m->n_discrete, *size = level + m->n_margins + 1;
+    return (Point){values, values + 1, x, z, level, size, size + m->n_states};
 }
 
 /* Lays out the block; called once with no memory, to learn the size. */
@@ -165,7 +165,7 @@ static bool point_is_sound(const Model *m, const Point *point)
     bool sound = all_finite(point->time, 2 + m->n_states + m->n_discrete) && *point->step >= 0.0;
     for (size_t i = 0; i <= m->n_margins; i++)
         sound = sound && !isnan(point->level[i]);
-    return sound && all_finite(point->size, m->n_states);
+    return sound && all_finite(point->size, m->n_states + N_PROGRESS);
 }
 
 static bool segment_is_sound(const Engine *engine)
@@ -187,7 +187,9 @@ bool engine_block_is_sound(const Engine *engine, void *block)
         status->ending >= ENDED_NOT && status->ending <= ENDED_JUMPS && status->prediction >= PREDICTION_NONE &&
         status->prediction <= PREDICTION_QUIET && memchr(status->message, '\0', sizeof status->message) != NULL &&
         isfinite(status->start_time) && status->floor >= 0.0 && isfinite(status->floor) && !isnan(status->stop_time) &&
-        isfinite(status->jumps_time);
+        isfinite(status->jumps_time) && isfinite(status->recent_time);
+    for (size_t i = 0; i < N_RECENT; i++)
+        sound = sound && status->recent[i] < (m->n_jumps > 0 ? m->n_jumps : 1);
     for (size_t j = 0; j < m->n_jumps; j++)
         sound = sound && other.history[j].stored <= N_ZENO_TIMES;
     return sound && point_is_sound(m, &other.live) && point_is_sound(m, &other.predicted) &&

@@ -43,6 +43,7 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
     if (!engine_step_begin(engine, point) || (locate && !engine_flow_may_begin(engine, point, &level))) /* line 10 */
         return FLOW_PROBLEM;
     engine_clear_levels(engine, point); /* line 11 */
+    engine_begin_pace(point);
     if (*point->time == engine->status->start_time ||
         engine_largest_state(engine, point, point->x) <= DBL_MIN / engine->model->scales.absolute)
         engine_raise_floor(engine, point, end);

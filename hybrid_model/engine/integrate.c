@@ -6,21 +6,6 @@
 
 #include "method.h"
 
-/* The absolute part follows from the nominal value, or from the sizes of the states: see usual_sizes in
-   hybrid_model/scales.py. */
-double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size)
-{
-    const EngineOptions *options = &engine->options;
-    const ModelScales *scales = &engine->model->scales;
-    double nominal = engine->model->nominals[i], looser = options->relative_tolerance / RELATIVE_TOLERANCE;
-    if (options->absolute_tolerance > 0.0)
-        return options->absolute_tolerance + options->relative_tolerance * size;
-    double shown = fmax(engine->status->floor, fmax(point->size[i], size)) / engine->largest;
-    double usual = engine->largest * (shown < scales->rounding_level ? 1.0 : sqrt(shown));
-    double part = scales->absolute * looser * (nominal > 0.0 ? nominal : fmin(usual, 1.0));
-    return part + options->relative_tolerance * size;
-}
-
 bool engine_step_begin(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
@@ -52,11 +37,7 @@ static bool step_too_small(Engine *engine, const Point *point, double h, bool fi
             "'%s' = %.17g does not stay finite beyond t = %.17g. Remedy: check the flow map for a division "
             "by zero or a finite escape time, or keep the state in a flow set.",
             name, value, *point->time);
-    return engine_fail(
-        engine, ENDED_FAILED,
-        "The solver needs steps below %.3g s at t = %.17g, where '%s' = %.17g changes too fast for its "
-        "tolerance. Remedy: declare a discontinuity of the flow map as a time event, or scale the state.",
-        h, *point->time, name, value);
+    return engine_too_small(engine, point, h);
 }
 
 /* The proposal for the step after one of the length `used` where `h` was possible. */
@@ -93,7 +74,7 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
             *point->step = next_step(method, h, used, error, rejected);
             step->has_vectors = false;
             engine->statistics.steps++;
-            return true;
+            return engine_gets_on(engine, point, limit);
         }
         h = used * (isfinite(error) ? fmax(0.1, 0.9 * pow(error, -1.0 / method->order)) : 0.1);
         rejected = true;

@@ -115,6 +115,8 @@ bool engine_apply_reset(Engine *engine, size_t jump, const Point *point)
     if (!evaluate_reset(engine, jump, point))
         return engine_fail(engine, ENDED_FAILED, "The jump map of '%s' could not be evaluated at t = %.17g.",
                            NAME_AT(engine->model->names, entry->name), *point->time);
+    if (point == &engine->live)
+        engine_note_jump(engine, jump);
     if (point == &engine->live && !engine_record_jump(engine, jump))
         return false;
     if (!accept_state(engine, jump, point) || (entry->kind == JUMP_ON_TIME && !moved_on(engine, jump, was, point)))

@@ -33,10 +33,6 @@ struct Method {
 
 extern const Method engine_dormand_prince;
 
-/* integrate.c */
-/* The error that is allowed in state i of that size; engine->largest must be there. */
-double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size);
-
 /* dense.c */
 void engine_interpolate_nested(const double *vectors, size_t n_states, double a, double *x);
 void engine_straight_nested(const double *x0, const double *x1, size_t n_states, double *vectors);

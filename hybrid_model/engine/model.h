@@ -42,6 +42,7 @@ typedef struct {
 
 #define N_REACH_AT 4
 #define N_PROBE_PARTS 3
+#define N_AWAY 3
 /* The numbers of the semantics, none of which is in seconds or in the unit of a state: see
    hybrid_model/scales.py, from which the generator takes them. */
 typedef struct {
@@ -49,6 +50,8 @@ typedef struct {
     double jumps_at_once, jumps_in_window, accumulation, spread, crowd, resolved, chatter, pause;
     double euler_part, blind_part, first_growth, first_least, reach_step, reach_at[N_REACH_AT];
     double probe_parts[N_PROBE_PARTS], steady;
+    double sliding_after, sliding_looks, sliding_found, sliding_left, sliding_ahead;
+    double retained, halvings_least, halvings_most, away[N_AWAY], pace_steps, most_steps;
 } ModelScales;
 
 typedef struct {

@@ -14,6 +14,7 @@
 #define N_SAMPLES 9           /* of each margin, where a step is looked at for crossings */
 #define N_GAPS 8              /* gaps of each jump that must look geometric */
 #define N_ZENO_TIMES (N_GAPS + 1)
+#define N_RECENT 32           /* of the last jumps at one instant, to name those that enable each other */
 #define MESSAGE_SIZE 768
 
 #define RELATIVE_TOLERANCE 1e-13  /* below, rounding would decide about steps */
@@ -27,7 +28,7 @@
    interpolation is some ten times as great, and falls with the fifth power. */
 #define SEGMENT_PART 0.35
 
-/* A point of the run.  time, step, x, z, level and size lie one after the other in memory, so one copy
+/* A point of the run.  time, step, x, z, level, size and progress lie one after the other in memory, so one copy
    moves them all; size holds the largest value that each continuous state has had; step is the solver's
    proposal for the next step, 0 when there is none.  level is the margin from which on each guard is
    enabled: 0, or slightly below where a flow ended so shortly
@@ -40,7 +41,17 @@ typedef struct {
     double *z;
     double *level;
     double *size;
+    double *progress;         /* see below */
 } Point;
+
+/* What is counted to see whether a flow gets on. */
+enum {
+    LOOKS_STEPS,              /* of the solver, of which the last ones are looked at */
+    LOOKS_BEGIN,              /* s: from where they are counted */
+    LOOKS_FOUND,              /* looks that have found a jump of the rates to which the flow leads back */
+    PACE_STEPS, PACE_BEGIN,
+    N_PROGRESS
+};
 
 /* The solver's step from x0 at t0 to x1 at t1. */
 typedef struct {
@@ -73,6 +84,9 @@ typedef struct {
     double floor;                 /* size that all states have at least, where they have shown none by themselves */
     double start_time, stop_time;
     double jumps_time;            /* of the last visible jump */
+    double recent_time;           /* of the last jumps, breakpoints too, that were taken at one instant */
+    uint64_t n_recent;            /* so many they are, of which the last ones are kept */
+    uint32_t recent[N_RECENT];
     uint64_t jumps_taken;         /* in the last advance */
     /* The live point lies on a step of the solver that goes on to segment_end. */
     double segment_begin, segment_end;
@@ -174,6 +188,8 @@ bool engine_rates(Engine *engine, double t, const double *x, const double *z, do
 double engine_state_size(const Engine *engine, const Point *point, size_t i, double x);
 /* The largest state that the run has shown at the point, and at x. */
 double engine_largest_state(const Engine *engine, const Point *point, const double *x);
+/* The error that is allowed in state i of that size; engine->largest must be there. */
+double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size);
 /* The point has got where it is: its states are among those that the run has shown. */
 void engine_note_sizes(const Engine *engine, const Point *point);
 /* Guards are enabled from zero on. */
@@ -188,6 +204,14 @@ bool engine_first_step(Engine *engine, const Point *point, double limit, double 
 /* Gives states that are far below where a flow to `limit` may lead a size of that; whether they got one.
    engine_step_begin comes before. */
 bool engine_raise_floor(Engine *engine, const Point *point, double limit);
+
+/* progress.c */
+/* Whether the run gets on with the step that was accepted towards `limit`; false if it creeps or chatters. */
+bool engine_gets_on(Engine *engine, const Point *point, double limit);
+/* Notes that no step of h is short enough, and why; always false. */
+bool engine_too_small(Engine *engine, const Point *point, double h);
+/* The pace of a flow is counted from the point on. */
+void engine_begin_pace(const Point *point);
 
 /* integrate.c */
 /* Evaluates the flow at the point into step->k[0]. */
@@ -235,6 +259,8 @@ bool engine_blocked(Engine *engine, double t, const double *x, const double *z, 
 /* zeno.c */
 /* Records a jump of the live point at its time; false if it is one too many. */
 bool engine_zeno_record(Engine *engine, size_t jump);
+/* Notes a jump of the live point, a breakpoint as well, to name those that enable each other. */
+void engine_note_jump(Engine *engine, size_t jump);
 /* Notes that a jump is taken at one instant for the `count`th time, which is once too often; always false. */
 bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t);
 

@@ -24,6 +24,21 @@ double engine_largest_state(const Engine *engine, const Point *point, const doub
     return largest;
 }
 
+/* The absolute part follows from the nominal value, or from the sizes of the states: see usual_sizes in
+   hybrid_model/scales.py. */
+double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size)
+{
+    const EngineOptions *options = &engine->options;
+    const ModelScales *scales = &engine->model->scales;
+    double nominal = engine->model->nominals[i], looser = options->relative_tolerance / RELATIVE_TOLERANCE;
+    if (options->absolute_tolerance > 0.0)
+        return options->absolute_tolerance + options->relative_tolerance * size;
+    double shown = fmax(engine->status->floor, fmax(point->size[i], size)) / engine->largest;
+    double usual = engine->largest * (shown < scales->rounding_level ? 1.0 : sqrt(shown));
+    double part = scales->absolute * looser * (nominal > 0.0 ? nominal : fmin(usual, 1.0));
+    return part + options->relative_tolerance * size;
+}
+
 void engine_note_sizes(const Engine *engine, const Point *point)
 {
     for (size_t i = 0; i < engine->model->n_states; i++)

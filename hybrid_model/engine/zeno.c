@@ -5,6 +5,7 @@
    sequence whose rest is small beside them: the jumps accumulate; (c) a burst of jumps that is
    small beside the longest gap since the last pause, or that floating point does not resolve. */
 #include <math.h>
+#include <stdio.h>
 
 #include "parts.h"
 
@@ -72,10 +73,60 @@ static bool shrinking(double spread, const JumpHistory *history, double *gap, do
     return greatest < 1.0 && greatest - least <= spread * *ratio;
 }
 
+void engine_note_jump(Engine *engine, size_t jump)
+{
+    Status *status = engine->status;
+    if (status->recent_time != *engine->live.time)
+        status->n_recent = 0;
+    status->recent_time = *engine->live.time;
+    status->recent[status->n_recent++ % N_RECENT] = (uint32_t)jump;
+}
+
+/* The jump that was taken `back` jumps before the last one at this instant. */
+static size_t recent(const Status *status, uint64_t back)
+{
+    return status->recent[(status->n_recent - 1 - back) % N_RECENT];
+}
+
+/* Whether a jump before the one `back` jumps before the last was another one than those after it, and than `jump`. */
+static bool is_new(const Status *status, uint64_t back, size_t jump)
+{
+    bool found = recent(status, back) != jump;
+    for (uint64_t later = 0; later < back; later++)
+        found = found && recent(status, later) != recent(status, back);
+    return found;
+}
+
+/* The other jumps that were taken last at this instant, in the order in which they follow `jump`: "'b', 'c'"; how many
+   they are. */
+static size_t in_turn_with(const Engine *engine, size_t jump, char *text, size_t size)
+{
+    const Status *status = engine->status;
+    uint64_t kept = (uint64_t)fmin(fmin((double)status->n_recent, N_RECENT), engine->options.jumps_at_once + 1.0);
+    size_t count = 0, used = 0;
+    text[0] = '\0';
+    for (uint64_t back = kept; back-- > 0;) {
+        if (!is_new(status, back, jump))
+            continue;
+        const char *name = NAME_AT(engine->model->names, engine->model->jumps[recent(status, back)].name);
+        int added = used < size ? snprintf(text + used, size - used, "%s'%s'", count++ ? ", " : "", name) : 0;
+        used += added > 0 ? (size_t)added : 0;
+    }
+    engine_end_text(text);
+    return count;
+}
+
 bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long count, double t)
 {
     const ModelJump *entry = &engine->model->jumps[jump];
     const char *name = NAME_AT(engine->model->names, entry->name);
+    char others[NAME_SIZE];
+    if (engine->status->recent_time == t && in_turn_with(engine, jump, others, sizeof others) > 0)
+        return engine_fail(engine, ENDED_ZENO,
+                           "Zeno: %llu jumps of '%s' at one instant, t = %.10g s, in turn with %s: they enable each "
+                           "other. Remedy: make the jump map of one of them leave the jump sets of the others (a "
+                           "margin of zero is inside), or move its time on past the present.",
+                           count, name, t, others);
     if (entry->kind == JUMP_ON_TIME)
         return engine_fail(
             engine, ENDED_ZENO,

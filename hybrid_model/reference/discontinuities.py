@@ -3,7 +3,7 @@
 The flow may not have a jump of its rates inside (rule 13 of docs/semantics.md). Steps cross one that they meet once
 after some rejections; where the flow on both sides leads back to it, as with a relay, no step leads away from it, and
 the solution that remains, in the sense of A. F. Filippov, "Differential equations with discontinuous righthand sides",
-1988, section 4, is the solver's by chance only. `hybrid_model/engine/chatter.c` looks in the same way.
+1988, section 4, is the solver's by chance only. `hybrid_model/engine/progress.c` looks in the same way.
 """
 
 from __future__ import annotations
@@ -30,9 +30,13 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class JumpOfRates:
-    """Two points next to each other between which the rate of state `row` jumps; `gap` is the time between them."""
+    """Two points next to each other between which the rate of state `row` jumps; `gap` is the time between them.
+
+    `rates` are those of the state a little before and after.
+    """
 
     row: int
+    rates: tuple[float, float]
     before: Side
     after: Side
     gap: float
@@ -75,7 +79,9 @@ def jump_of_rates(rates: Rates, start: Side, end: Side, scale: FloatArray) -> Ju
         a, b = (a, middle) if first >= second else (middle, b)
         halvings += 1
         gap = 0.5 * gap if moved else gap
-    return None if halvings < HALVINGS_LEAST else JumpOfRates(row, a, b, gap)
+    if halvings < HALVINGS_LEAST:
+        return None
+    return JumpOfRates(row, (float(start.rates[row]), float(end.rates[row])), a, b, gap)
 
 
 def leads_back(rates: Rates, jump: JumpOfRates, longest: float) -> bool:
@@ -94,4 +100,3 @@ def leads_back(rates: Rates, jump: JumpOfRates, longest: float) -> bool:
 def _leads_to(rates: Rates, here: Side, there: Side, row: int, time: float) -> bool:
     found = rates(here.t + time, here.x + time * here.rates)[row]
     return bool(abs(found - there.rates[row]) < abs(found - here.rates[row]))
-

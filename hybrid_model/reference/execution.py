@@ -67,6 +67,7 @@ class Execution(Point):
         other = copy.copy(self)
         other.inputs = self.inputs.copy()
         other.monitor = copy.deepcopy(self.monitor)
+        other.looks = copy.copy(self.looks)
         other.begin_at(self.x.copy(), self.z.copy())
         return other
 

@@ -6,6 +6,7 @@ Jumps, flows and the search for events read a point; only the methods of its cla
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +20,19 @@ from hybrid_model.errors import SimulationError
 from hybrid_model.record.flow_piece import FlowPiece
 from hybrid_model.scales import one_instant
 from hybrid_model.solver import Solver
+
+
+@dataclass
+class Looks:
+    """Steps of a run since `begin` in s, and how many looks have found that none leads away from a jump of rates."""
+
+    begin: float
+    steps: int = 0
+    found: int = 0
+
+    def begin_at(self, t: float) -> None:
+        """Begin anew at `t` in s."""
+        self.begin, self.steps, self.found = t, 0, 0
 
 
 class Point:
@@ -54,6 +68,8 @@ class Point:
     levels : ndarray
         The margin from which on each jump on state is due: zero, or slightly below where the crossing is so near to the
         end of a flow that it counts as reached (rule 6).
+    looks : Looks
+        Whether its flow chatters.
     """
 
     def __init__(
@@ -87,6 +103,7 @@ class Point:
         self.floor = 0.0
         self.next_step: float | None = None
         self.levels: FloatArray = np.zeros(self.guards)
+        self.looks = Looks(self.t)
         self.compute_start()
 
     # The writers.

@@ -13,6 +13,7 @@ from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import HybridModelError, SimulationError
 from hybrid_model.record.flow_piece import FlowPiece, straight_piece
 from hybrid_model.reference.point import Point
+from hybrid_model.reference.progress import Progress
 from hybrid_model.reference.tolerances import reach, step_from
 from hybrid_model.reference.zero_crossings import SMALLEST
 from hybrid_model.scales import ABSOLUTE, UNKNOWN, tolerance_sizes, ulp
@@ -24,10 +25,6 @@ ATTEMPTS = 1000
 halves its step to nothing needs hundreds, and LSODA would try the same step for ever."""
 STATELESS_STEPS = 25
 """Steps over a flow without continuous states, where no error estimate limits them."""
-PACE_STEPS = 2000
-"""So often the pace of a flow is looked at."""
-MOST_STEPS = 1e7
-"""A flow that would need more steps than this at its present pace is given up: no run lasts that long."""
 
 
 class StuckError(SimulationError):
@@ -91,7 +88,7 @@ def steps(point: Point, end: float) -> Any:
     if point.t == point.t_start or point.sizes.max() == 0.0:
         _raise_floor(point, end)
     first = min(point.next_step or _first_step(point, end), options.max_step, end - point.t)
-    stepper, pace = _stepper(point, flow_map, end, first), Pace(point, end)
+    stepper, progress = _stepper(point, flow_map, end, first), Progress(point, end)
     while stepper.status == "running":
         t0, x0 = stepper.t, stepper.y
         flow_map.forget()
@@ -111,12 +108,13 @@ def steps(point: Point, end: float) -> Any:
             point.propose_step(getattr(stepper, "h_abs", None))
             yield FlowPiece(t0, stepper.t, x0, stepper.y, stepper.dense_output())
             stepper.atol = _absolute_tolerance(point, 0.0)
-            pace.check(stepper.t)
+            progress.check(stepper.t - t0, stepper.atol)
         elif not flow_map.trouble and _raise_floor(point, end):
             stepper = _stepper(point, flow_map, end, min(_first_step(point, end), options.max_step))
         else:
             kind = StuckError if flow_map.trouble else SimulationError
-            raise kind(_failure(point, flow_map, t0, x0, problem or "the step length fell to zero"))
+            what = "" if flow_map.trouble else progress.what_jumps(_absolute_tolerance(point, 0.0))
+            raise kind(_failure(point, flow_map, t0, x0, problem or "the step length fell to zero", what))
 
 
 def _stepper(point: Point, flow_map: FlowMap, end: float, first: float) -> Any:
@@ -164,31 +162,6 @@ def _absolute_tolerance(point: Point, first_reach: float) -> FloatArray:
     return ABSOLUTE * np.where(np.isnan(point.nominal), usual, point.nominal)
 
 
-class Pace:
-    """Gives up a flow that would take for ever: a stepper that creeps does not fail by itself."""
-
-    def __init__(self, point: Point, end: float) -> None:
-        self._point, self._end = point, end
-        self._t, self._steps = point.t, 0
-
-    def check(self, t: float) -> None:
-        """Count a step that ends at `t` in s."""
-        self._steps += 1
-        if self._steps % PACE_STEPS:
-            return
-        needed = (self._end - t) / (t - self._t) * PACE_STEPS
-        if needed > MOST_STEPS:
-            point = self._point
-            state = point.layout.describe({Kind.STATE: point.x, Kind.DISCRETE: point.z})
-            raise SimulationError(
-                f"{point.automaton.name}: the flow creeps: its last {PACE_STEPS} steps led from t = {self._t:.9g} "
-                f"to {t:.9g} s ({state}), so that it would need {needed:.2g} more to reach {self._end:.9g} s. Look for "
-                "a flow map that is not smooth there (a root at zero, a sign): write it as modes with a switch, or "
-                "smooth it; for a stiff flow choose Radau or BDF, and looser tolerances."
-            )
-        self._t = t
-
-
 def _stateless_steps(point: Point, end: float) -> Any:
     step = min(point.solver.max_step, (end - point.t) / STATELESS_STEPS)
     times = np.linspace(point.t, end, int(np.ceil((end - point.t) / step)) + 1)
@@ -196,10 +169,11 @@ def _stateless_steps(point: Point, end: float) -> Any:
         yield straight_piece(float(t0), float(t1), point.x, point.x)
 
 
-def _failure(point: Point, flow_map: FlowMap, t: float, x: FloatArray, problem: str | None) -> str:
+def _failure(point: Point, flow_map: FlowMap, t: float, x: FloatArray, problem: str | None, what: str = "") -> str:
     why = (
-        f"no step meets the tolerances ({str(problem).rstrip('.')}); where the flow map jumps, let a jump or a time "
-        "event happen, and where an input jumps, give it as a Signal with its breakpoints"
+        f"no step meets the tolerances ({str(problem).rstrip('.')}){'; ' + what if what else ''}; where the flow map "
+        "jumps, write it as modes with a switch, or let a jump or a time event happen, and where an input jumps, give "
+        "it as a Signal with its breakpoints"
     )
     if flow_map.trouble:
         why = f"{flow_map.trouble}; the flow map must give finite numbers in the flow set"

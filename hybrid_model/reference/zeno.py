@@ -16,6 +16,8 @@ from hybrid_model import scales
 from hybrid_model.errors import SimulationError
 from hybrid_model.scales import ulp
 
+RECENT = 32
+"""So many of the last jumps at one instant are kept, to name those that enable each other."""
 GAPS = 8
 """Ratios of successive gaps are compared over this many gaps: enough to tell geometric shrinking from chance."""
 
@@ -135,6 +137,8 @@ class ZenoMonitor:
     def __init__(self, guard: ZenoGuard) -> None:
         self.guard = guard
         self._histories: dict[str, _History] = {}
+        self._recent: deque[str] = deque(maxlen=min(RECENT, guard.jumps_at_once + 1))
+        self._instant = math.nan
 
     def record(self, jump: str, t: float, *, on_state: bool = True) -> str | None:
         """Count a jump at time `t`.
@@ -155,12 +159,22 @@ class ZenoMonitor:
         """
         history = self._histories.setdefault(jump, _History())
         history.add(t, self.guard.jumps_in_window)
+        if t != self._instant:
+            self._recent.clear()
+        self._instant = t
+        self._recent.append(jump)
         if history.at_once > self.guard.jumps_at_once:
-            remedy = _STILL_ENABLED if on_state else _STILL_DUE
-            return f"{history.at_once} jumps of {jump!r} at one instant, t = {t:.9g} s: {remedy}"
+            others = self._in_turn_with(jump)
+            remedy = _IN_TURN if others else _STILL_ENABLED if on_state else _STILL_DUE
+            return f"{history.at_once} jumps of {jump!r} at one instant, t = {t:.9g} s{others}: {remedy}"
         if not on_state:
             return None
         return self._geometric(jump, history, t) or self._crowded(jump, history, t)
+
+    def _in_turn_with(self, jump: str) -> str:
+        """Name the other jumps that were taken last at this instant, in the order in which they follow `jump`."""
+        others = list(dict.fromkeys(name for name in reversed(self._recent) if name != jump))[::-1]
+        return ", in turn with " + ", ".join(map(repr, others)) if others else ""
 
     def _geometric(self, jump: str, history: _History, t: float) -> str | None:
         shrinking = history.shrinking(self.guard.spread)
@@ -190,6 +204,10 @@ class ZenoMonitor:
         )
 
 
+_IN_TURN = (
+    "they enable each other. Make the jump map of one of them leave the jump sets of the others (a margin of zero is "
+    "inside), or move its time on past the present."
+)
 _STILL_DUE = (
     "its time is still not after the present. Let the jump map move the time on past it; where a run starts later than "
     "its clock, declare the clock's state with computed=True and let start_map give the next time to come."
