@@ -78,7 +78,7 @@ def test_chattering_is_told_with_the_time_the_state_and_the_remedy(name, exporte
 
 @pytest.mark.parametrize("method", ["RK45", "Radau", "LSODA"])
 def test_other_methods_and_looser_tolerances_tell_it_too(method):
-    with pytest.raises(hm.SimulationError, match=r"flow chatters at t = 1(\.0\d+)? s: the rate of 'x' jumps"):
+    with pytest.raises(hm.SimulationError, match=r"t = 1(\.0\d+)? s.* the rate of 'x' jumps from -?1 to -?1 "):
         hm.simulate(Relay(), 1e5, solver=hm.Solver(method=method, rtol=1e-9, atol=1e-11))
 
 
@@ -168,10 +168,10 @@ class Fast(hm.HybridAutomaton):
 
 
 GOING_ON = {
-    "Stairs": (Stairs(), 1.0, sum(range(40)) / 1600.0, 1e-11),
+    "Stairs": (Stairs(), 1.0, sum(range(40)) / 1600.0, 1e-10),
     # From k to k + 1 in 1 / (10 + k): to 5 in 1/10 + ... + 1/14.
     "StairsOfState": (StairsOfState(), sum(1.0 / k for k in range(10, 15)), 5.0, 1e-10),
-    "SquareWave": (SquareWave(), 1.05, 0.05, 1e-11),
+    "SquareWave": (SquareWave(), 1.05, 0.05, 1e-10),
     "Swing": (Swing(), 4.0 * np.sqrt(2.0), 1.0, 1e-10),
     "Steep": (Steep(), 2.5, 1.0 + np.arctanh(0.5) / 1e4, 1e-11),
     "Fast": (Fast(), 1.0, np.sin(1000.0), 1e-10),
@@ -182,7 +182,7 @@ GOING_ON = {
 
 @pytest.mark.parametrize("name", GOING_ON)
 def test_what_is_smooth_or_passes_a_jump_goes_on(name, exported):
-    """Tolerances: some 1e-13 a jump that is passed."""
+    """Tolerances: a jump that is passed costs some 1e-13 to 1e-12, since the error of a step is not estimated there."""
     automaton, t_end, exact, within = GOING_ON[name]
     assert hm.simulate(automaton, t_end).end.x == pytest.approx(exact, abs=within)
     path = exported(automaton, f"going_on_{name}")
