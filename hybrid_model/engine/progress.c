@@ -161,8 +161,8 @@ static const char *describe(const Engine *engine, const JumpOfRates *jump, char 
 /* Whether at the pace of the last `steps` steps the run comes to its end, if that is known, with not many more. */
 static bool soon_over(const Engine *engine, const Point *point, double steps)
 {
-    double t = engine->step.t1;
-    return engine->status->stop_time - t <= engine->model->scales.sliding_left / steps * (t - point->progress[LOOKS_BEGIN]);
+    double t = engine->step.t1, pace = (t - point->progress[LOOKS_BEGIN]) / steps;
+    return engine->status->stop_time - t <= engine->model->scales.sliding_left * pace;
 }
 
 static void begin_looks(const Point *point, double steps, double t)
