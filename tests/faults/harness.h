@@ -1,7 +1,7 @@
 /* An importer of one model that both versions of the standard look alike to.
 
-   harness.c reads calls from its input, one a line, and writes what each of them gave.  importer_fmi2.c and
-   importer_fmi3.c are the same importer by the functions of one version.  The model is linked in, so that sanitizers
+   harness.c reads calls from its input, one a line, and writes what each of them gave.  importer.c calls the
+   functions of the version that it is compiled for.  The model is linked in, so that sanitizers
    and valgrind see all of it; shim.c stands between the runtime and the memory functions. */
 #ifndef HARNESS_H
 #define HARNESS_H

@@ -1,6 +1,7 @@
 /* A decay x' = -rate x + u, y = x, stepped by Euler: both versions, all interface types, and faults by -DFAULT_NAME.
    No FMI header: the signatures are the standard's, written out for this one machine. */
 #include <math.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -108,6 +109,9 @@ static int step(State* s, double t, double h) {
         fprintf(stderr, "the solver lost its way\n");
         *(volatile int*)8 = 1;
     }
+#endif
+#ifdef FAULT_PARENT
+    if (s->t > 0.3) kill(getppid(), SIGKILL);
 #endif
 #ifdef FAULT_ABORT
     if (s->t > 0.3) abort();

@@ -41,6 +41,7 @@ FAULTS = [
     ("INSTANTIATE", (2, 3), "run.instantiate"),
     ("CRASH", (2, 3), "run.crash"),
     ("ABORT", (3,), "run.crash"),
+    ("PARENT", (3,), "run.crash"),
     ("EXIT", (2, 3), "run.exit"),
     ("NAN", (2, 3), "run.nan"),
     ("GETTER", (2, 3), "run.getter"),

@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -20,12 +21,9 @@ from fmu.validate.findings import Finding, Severity, error, note, quoted, warnin
 
 LIFE_CYCLE = "FMI 2.0.4 sections 3.2 and 4.2; FMI 3.0.2 sections 2.3, 3.2 and 4.2"
 _ROOT = Path(__file__).resolve().parents[3]
-_START = """\
-import sys
-sys.path.insert(0, sys.argv[1])
-from fmu.validate.child.experiments import main
-sys.exit(main(sys.argv[2]))
-"""
+_BEGIN = "import sys; sys.path.insert(0, sys.argv[1]); "
+_FORKS = _BEGIN + "from fmu.validate.child.forks import serve; serve()"
+_ONE = _BEGIN + "from fmu.validate.child.experiments import main; sys.exit(main(sys.argv[2]))"
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ class RunLimits:
     file_bytes: int = 64 << 20
 
 
-def run_experiment(plan: dict[str, Any], limits: RunLimits) -> Iterator[Finding]:
+def run_experiment(plan: dict[str, Any], limits: RunLimits, children: Children) -> Iterator[Finding]:
     """Make the experiment of a plan, and yield what it finds and how its process ends.
 
     Parameters
@@ -56,6 +54,8 @@ def run_experiment(plan: dict[str, Any], limits: RunLimits) -> Iterator[Finding]
     plan : dict
         From `fmu.validate.smoke.plan.plan_of`, with the name of the experiment.
     limits : RunLimits
+    children : Children
+        Where its process comes from.
     """
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
@@ -71,7 +71,7 @@ def run_experiment(plan: dict[str, Any], limits: RunLimits) -> Iterator[Finding]
         }
         plan = {**plan, **bounds, "place": str(place), "findings": str(findings)}
         (folder / "plan.json").write_text(json.dumps(plan), encoding="utf-8")
-        status = _run(folder, work, limits)
+        status = children.run(folder, limits.seconds)
         lines = _lines(findings)
         done = any(line.get("done") for line in lines)
         at = place.read_bytes().rstrip(b"\0").decode("utf-8", "replace")
@@ -90,29 +90,67 @@ def run_experiment(plan: dict[str, Any], limits: RunLimits) -> Iterator[Finding]
             yield warning("run.files", f"It leaves {quoted(left[0])} in the working folder, which is the host's.")
 
 
-def _run(folder: Path, work: Path, limits: RunLimits) -> int | None:
-    """Return the exit status of the child, or None if its time ran out."""
-    command = [sys.executable, "-I", "-c", _START, str(_ROOT), str(folder / "plan.json")]
+class Children:
+    """Where child processes come from: forks of one that has everything imported, or, without `fork`, each by itself.
+
+    Used as a context; the process is started when the first child is wanted.
+    """
+
+    def __init__(self) -> None:
+        self._parent: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Children:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._parent is not None:
+            self._parent.communicate()
+
+    def run(self, folder: Path, seconds: float) -> int | None:
+        """Make the experiment of a folder; return its exit status, or None if its time ran out."""
+        if sys.platform == "win32":
+            return _run_alone(folder, seconds)
+        parent = self._parent = self._parent or subprocess.Popen(
+            [sys.executable, "-I", "-c", _FORKS, str(_ROOT)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            bufsize=0,
+            start_new_session=True,
+        )
+        assert parent.stdin is not None
+        assert parent.stdout is not None
+        parent.stdin.write(f"{folder}\n".encode())
+        pid = int(parent.stdout.readline())
+        in_time = bool(select.select([parent.stdout], [], [], seconds)[0])
+        # What the child has started shares its group.
+        if not in_time:
+            _end_group(pid)
+        answer = parent.stdout.readline()
+        _end_group(pid)
+        if not answer:  # the child has ended its parent
+            parent.wait()
+            self._parent = None
+        return int(answer or -signal.SIGKILL) if in_time else None
+
+
+def _end_group(pid: int) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(pid, signal.SIGKILL)
+
+
+def _run_alone(folder: Path, seconds: float) -> int | None:
+    command = [sys.executable, "-I", "-c", _ONE, str(_ROOT), str(folder / "plan.json")]
     with (folder / "stdout").open("wb") as out, (folder / "stderr").open("wb") as err:
         process = subprocess.Popen(
-            command, cwd=work, stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
+            command, cwd=folder / "work", stdin=subprocess.DEVNULL, stdout=out, stderr=err, start_new_session=True
         )
         try:
-            return process.wait(limits.seconds)
+            return process.wait(seconds)
         except subprocess.TimeoutExpired:
             return None
         finally:
-            _end(process)
-
-
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """End the child and what it started: they share its session's group."""
-    if hasattr(os, "killpg"):
-        with contextlib.suppress(ProcessLookupError, PermissionError):
-            os.killpg(process.pid, signal.SIGKILL)
-    elif process.poll() is None:
-        process.kill()
-    process.wait()
+            process.kill()
+            process.wait()
 
 
 def _lines(path: Path) -> list[dict[str, Any]]:

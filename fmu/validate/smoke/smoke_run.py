@@ -10,7 +10,7 @@ from fmu.standard.capabilities import DERIVATIVES, Capability
 from fmu.standard.platforms import EXTENSIONS, parts_of, runs_here, this_machine
 from fmu.validate.findings import Finding, note, quoted, softened
 from fmu.validate.reading.description import Description
-from fmu.validate.smoke.child_process import RunLimits, run_experiment
+from fmu.validate.smoke.child_process import Children, RunLimits, run_experiment
 from fmu.validate.smoke.claims import claims
 from fmu.validate.smoke.moves import moves
 from fmu.validate.smoke.plan import LARGEST_ARRAY, plan_of
@@ -39,26 +39,30 @@ def run_fmu(folder: Path, description: Description, limits: RunLimits) -> tuple[
     """
     executed: list[str] = []
     findings: list[Finding] = []
-    for kind, attributes in description.interfaces.items():
-        binary = _binary(folder, attributes.get("modelIdentifier", ""))
-        if binary is None:
-            machine = "-".join(this_machine())
-            findings.append(
-                note("run.platform", f"{kind} was not run: there is no binary for this machine, {machine}.")
+    with Children() as children:
+        for kind, attributes in description.interfaces.items():
+            binary = _binary(folder, attributes.get("modelIdentifier", ""))
+            if binary is None:
+                machine = "-".join(this_machine())
+                findings.append(
+                    note("run.platform", f"{kind} was not run: there is no binary for this machine, {machine}.")
+                )
+                continue
+            if description.can(kind, Capability.EXECUTION_TOOL):
+                findings.append(
+                    note("run.tool", f"{kind} was not run: it needs its tool at run time (needsExecutionTool).")
+                )
+                continue
+            plan = plan_of(folder, binary, description, kind)
+            found = _run_kind(
+                plan,
+                {**_experiments(description, kind), **claims(description, kind), **moves(description, kind)},
+                limits,
+                children,
             )
-            continue
-        if description.can(kind, Capability.EXECUTION_TOOL):
-            findings.append(
-                note("run.tool", f"{kind} was not run: it needs its tool at run time (needsExecutionTool).")
-            )
-            continue
-        plan = plan_of(folder, binary, description, kind)
-        found = _run_kind(
-            plan, {**_experiments(description, kind), **claims(description, kind), **moves(description, kind)}, limits
-        )
-        if not any(finding.rule == "run.library" for _, finding in found):
-            executed.append(kind)
-        findings += _told_once(kind, found)
+            if not any(finding.rule == "run.library" for _, finding in found):
+                executed.append(kind)
+            findings += _told_once(kind, found)
     large = [v for v in description.variables if (description.size(v) or 0) > LARGEST_ARRAY]
     if large:
         findings.append(note("run.large", f"The array {quoted(large[0].name)} is too large to be read in the run."))
@@ -66,12 +70,12 @@ def run_fmu(folder: Path, description: Description, limits: RunLimits) -> tuple[
 
 
 def _run_kind(
-    plan: dict[str, Any], experiments: dict[str, dict[str, Any]], limits: RunLimits
+    plan: dict[str, Any], experiments: dict[str, dict[str, Any]], limits: RunLimits, children: Children
 ) -> list[tuple[str, Finding]]:
     """Make the experiments on an interface type, and return what each finds, by its name."""
     found: list[tuple[str, Finding]] = []
     for name, changes in experiments.items():
-        here = list(run_experiment({**plan, **changes}, limits))
+        here = list(run_experiment({**plan, **changes}, limits, children))
         # Of an FMU that is given what no importer gives, only robustness is learned; clocks need Event Mode.
         soft = name in MISUSE or (name == WITHOUT_EVENT_MODE and plan["clocks"])
         found += [(name, softened(finding) if soft else finding) for finding in here]
