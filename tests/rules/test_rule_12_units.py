@@ -4,6 +4,7 @@ import fmpy
 import numpy as np
 import pytest
 from catalogue import cases
+from executions import reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rescaled import Charge, InOtherTime, Ring, Sawtooth, Twins
@@ -29,9 +30,9 @@ QUICK = {
 }
 
 
-def both_units(case, unit):
-    plain = hm.simulate(case.automaton, case.t_end)
-    return plain, hm.simulate(InOtherTime(case.automaton, unit), case.t_end * unit)
+def both_units(name, unit):
+    case = CASES[name]
+    return reference(name), hm.simulate(InOtherTime(case.automaton, unit), case.t_end * unit)
 
 
 @pytest.mark.parametrize("unit", [2.0**-40, 2.0**40])
@@ -40,7 +41,7 @@ def both_units(case, unit):
 )
 def test_a_unit_of_time_that_is_a_power_of_two_changes_no_bit_of_a_run(name, unit):
     """Scaling by a power of two rounds nothing, so every difference would come from a number that is in seconds."""
-    plain, other = both_units(CASES[name], unit)
+    plain, other = both_units(name, unit)
     assert (plain.stop, plain.t.size) == (other.stop, other.t.size)
     assert [(jump.name, jump.t * unit) for jump in plain.jumps] == [(jump.name, jump.t) for jump in other.jumps]
     assert np.array_equal(plain.t * unit, other.t)
@@ -53,7 +54,7 @@ def test_a_unit_of_time_that_is_a_power_of_two_changes_no_bit_of_a_run(name, uni
 @settings(max_examples=12)
 @given(st.floats(-12.0, 12.0), st.sampled_from(sorted(QUICK)))
 def test_any_unit_of_time_leaves_the_run_as_it_is(exponent, name):
-    plain, other = both_units(CASES[name], 10.0**exponent)
+    plain, other = both_units(name, 10.0**exponent)
     assert plain.stop is other.stop
     assert [jump.name for jump in plain.jumps] == [jump.name for jump in other.jumps]
     times = np.array([jump.t for jump in plain.jumps])

