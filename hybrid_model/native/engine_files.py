@@ -5,5 +5,5 @@ from pathlib import Path
 __all__ = ["ENGINE_FOLDERS"]
 
 _ENGINE = Path(__file__).resolve().parents[1] / "engine"
-ENGINE_FOLDERS = (_ENGINE, _ENGINE / "location", _ENGINE / "networks")
+ENGINE_FOLDERS = (_ENGINE, _ENGINE / "location", _ENGINE / "methods", _ENGINE / "networks")
 """Folders of its C sources and headers; files of all include each other by name alone."""

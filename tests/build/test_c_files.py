@@ -15,8 +15,8 @@ PREFIXES = {"engine": "engine_", "networks": "network_", "interface": "instance_
 
 
 def room_of(source):
-    """The folder of a C file; locating events is a part of the engine."""
-    return "engine" if source.parent.name == "location" else source.parent.name
+    """The folder of a C file; locating events and the methods of integration are parts of the engine."""
+    return "engine" if source.parent.name in ("location", "methods") else source.parent.name
 
 
 def symbols(source, folder):
