@@ -1,5 +1,7 @@
 """Hybrid automata: declare them once, run them event-exactly, export and co-simulate them."""
 
+from typing import TYPE_CHECKING
+
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.dwell import MinimumDwell
@@ -18,18 +20,21 @@ from hybrid_model.errors import (
     SimulationError,
     WiringError,
 )
+from hybrid_model.lazy_names import lazily
 from hybrid_model.record.arc import HybridArc, load_arc
 from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.samples import Samples
 from hybrid_model.reference.execution import Execution
 from hybrid_model.reference.zeno import ZenoGuard
-from hybrid_model.schedule.event_network import NetworkRun, simulate_network
 from hybrid_model.simulate import simulate
 from hybrid_model.solver import Method, Solver
 from hybrid_model.stop import Stop
-from hybrid_model.verification.report import Verification, Violation
-from hybrid_model.verification.subject import Tolerances
-from hybrid_model.verification.verify import verify
+
+if TYPE_CHECKING:
+    from hybrid_model.schedule.event_network import NetworkRun, simulate_network
+    from hybrid_model.verification.report import Verification, Violation
+    from hybrid_model.verification.subject import Tolerances
+    from hybrid_model.verification.verify import verify
 
 __all__ = [
     "AlgebraicLoopError",
@@ -80,3 +85,5 @@ __all__ = [
     "simulate_network",
     "verify",
 ]
+
+__getattr__ = lazily(__name__)

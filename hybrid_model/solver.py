@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import enum
+import importlib
 import math
 from dataclasses import dataclass, fields
 from typing import Any
-
-from scipy.integrate import BDF, DOP853, LSODA, RK45, Radau
 
 from hybrid_model.declare.real_numbers import is_real, told
 from hybrid_model.declare.signatures import ExplainedCall
@@ -15,13 +14,13 @@ from hybrid_model.errors import SimulationError
 
 
 class Method(enum.Enum):
-    """SciPy's steppers; the value is the class."""
+    """SciPy's steppers; the value is the name of the class in ``scipy.integrate``."""
 
-    DOP853 = DOP853
-    RK45 = RK45
-    RADAU = Radau
-    BDF = BDF
-    LSODA = LSODA
+    DOP853 = "DOP853"
+    RK45 = "RK45"
+    RADAU = "Radau"
+    BDF = "BDF"
+    LSODA = "LSODA"
 
 
 @dataclass(frozen=True)
@@ -80,11 +79,12 @@ class Solver(ExplainedCall):
     @property
     def stepper(self) -> Any:
         """SciPy's class of the method."""
-        return Method(self.method).value
+        # Imported by whoever steps with it: it takes longer to import than most runs take.
+        return getattr(importlib.import_module("scipy.integrate"), Method(self.method).value)
 
 
 def _by_name(name: str) -> Method:
-    known = {method.value.__name__: method for method in Method}
+    known = {method.value: method for method in Method}
     found = {key.upper(): method for key, method in known.items()}.get(str(name).upper())
     if found is None:
         raise SimulationError(f"solver option method = {name!r}: the methods are {', '.join(known)}.")

@@ -25,8 +25,6 @@ from fmu.describe.variables import Fmi
 from fmu.errors import ExportError
 from fmu.export import export_fmu
 from hybrid_model import Automaton
-from hybrid_model.consensus.laws.closed_loop import scenario_agents
-from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.declare.automaton import require_made
 
 KINDS = ("cs", "me")
@@ -128,6 +126,10 @@ def _automata(target: str, starts: dict[str, float]) -> tuple[float | None, dict
     if not colon or Path(target).suffix == ".toml":
         if starts:
             raise UsageError("--start-value goes with module:ClassName; a scenario has its values in its file.")
+        # Of what a class of one's own does not need.
+        from hybrid_model.consensus.laws.closed_loop import scenario_agents
+        from hybrid_model.consensus.scenario.files import load_scenario
+
         scenario = load_scenario(target)
         return scenario.stop_time, dict(scenario_agents(scenario))
     found = _found(module, name, target)

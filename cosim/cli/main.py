@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import io
 import os
 import sys
 from collections.abc import Sequence
+from types import ModuleType
 
-from cosim.cli import certify, cosimulate, export, paper, simulate, validate
 from cosim.cli.exits import Exit, UsageError
 from cosim.errors import CosimError
 from fmu.errors import BuildError, ExportError
 from hybrid_model import HybridModelError
 from hybrid_model.consensus.messages import ScenarioError
 
+_COMMANDS = {
+    "paper": "paper",
+    "simulate": "simulate",
+    "certify": "certify",
+    "export": "export",
+    "cosim": "cosimulate",
+    "validate": "validate",
+}
+"""Modules of this package."""
 _INTERRUPTED = 130
 """Status of a command that was interrupted from the keyboard, as shells have it."""
 
@@ -39,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in (paper, simulate, certify, export, cosimulate, validate):
+    for command in _modules(sys.argv[1:] if arguments is None else arguments):
         command.add_parser(commands)
     options = parser.parse_args(arguments)
     try:
@@ -54,6 +64,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(Exit.DONE)
     except (HybridModelError, ExportError, BuildError, CosimError, OSError) as error:
         return _report(error, Exit.FAILED)
+
+
+def _modules(arguments: Sequence[str]) -> list[ModuleType]:
+    """Import the command that is called, since some take long to import; all of them for help and for slips."""
+    called = [name for name in arguments[:1] if name in _COMMANDS]
+    return [importlib.import_module(f"cosim.cli.{_COMMANDS[name]}") for name in called or _COMMANDS]
 
 
 def _write_any_name() -> None:

@@ -6,66 +6,76 @@ instead, is in docs/paper-audit.md; "audit" with the number of a section means t
 pyproject.toml holds: `graphs` at its foot, `figures` at its top.
 """
 
-from hybrid_model.consensus.certificates.certify import Certificates, certify
-from hybrid_model.consensus.certificates.edge_comparison import EdgeComparison, compare_edge_domain
-from hybrid_model.consensus.certificates.forms import Certified
-from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound, convergence_bound
-from hybrid_model.consensus.certificates.windows import BestWindow, RateForm, best_window
-from hybrid_model.consensus.exact.edge_domain import EdgeGains, edge_domain_gains, edge_domain_system
-from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum
-from hybrid_model.consensus.exact.periodic_edge_domain import PeriodicGains, period_map, periodic_gains
-from hybrid_model.consensus.excitation.joint import JointExcitation, joint_excitation
-from hybrid_model.consensus.excitation.persistence import ExcitationConstants, WindowExtremes, scenario_excitation
-from hybrid_model.consensus.excitation.trees import tree_excitations
-from hybrid_model.consensus.graphs.digraphs import BalancedSwitching
-from hybrid_model.consensus.graphs.generators import (
-    AgentGraph,
-    agent_graph,
-    complete_graph,
-    erdos_renyi_graph,
-    geometric_graph,
-    path_graph,
-    regular_graph,
-    ring_graph,
-    small_world_graph,
-    star_graph,
-)
-from hybrid_model.consensus.graphs.spanning_trees import TreePartition, all_spanning_trees, spanning_tree_count
-from hybrid_model.consensus.laws.agents import Integrator, agent
-from hybrid_model.consensus.laws.closed_loop import broadcast_wires, closed_loop, scenario_agents
-from hybrid_model.consensus.laws.double_integrators import (
-    double_integrator_agents,
-    double_integrator_loop,
-    double_integrator_wires,
-)
-from hybrid_model.consensus.laws.threshold_triggers import DynamicTrigger, EventGenerator, MixedTrigger, StaticTrigger
-from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop, vector_wires
-from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.runs.communication import communication, gap_statistics
-from hybrid_model.consensus.runs.metrics import performance, run_metrics
-from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
-from hybrid_model.consensus.runs.savings import Savings, run_savings
-from hybrid_model.consensus.scenario.channel import Channel
-from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
-from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
-from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.consensus.switching.cycle import PeriodicSwitching
-from hybrid_model.consensus.switching.joint_connectivity import joint_connectivity_window
-from hybrid_model.consensus.switching.random_sequences import (
-    jointly_connected_sequence,
-    markov_sequence,
-    random_dwell_sequence,
-)
-from hybrid_model.consensus.switching.sequence import SequenceSwitching, SwitchingSequence
-from hybrid_model.consensus.weights.constant import ConstantWeight, ConstantWeights
-from hybrid_model.consensus.weights.distances import distance_weights, reliability_weight
-from hybrid_model.consensus.weights.function import FunctionWeight, FunctionWeights
-from hybrid_model.consensus.weights.gated_sine import GatedAbsoluteSineWeights, GatedSine, GatedSineWeights
-from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
-from hybrid_model.consensus.weights.sampled import SampledWeight
-from hybrid_model.consensus.weights.sine import SineWeight, SineWeights
-from hybrid_model.consensus.weights.square import SquareWeight, SquareWeights
-from hybrid_model.consensus.weights.tabulated import TabulatedWeights
+from typing import TYPE_CHECKING
+
+from hybrid_model.lazy_names import lazily
+
+if TYPE_CHECKING:
+    from hybrid_model.consensus.certificates.certify import Certificates, certify
+    from hybrid_model.consensus.certificates.edge_comparison import EdgeComparison, compare_edge_domain
+    from hybrid_model.consensus.certificates.forms import Certified
+    from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound, convergence_bound
+    from hybrid_model.consensus.certificates.windows import BestWindow, RateForm, best_window
+    from hybrid_model.consensus.exact.edge_domain import EdgeGains, edge_domain_gains, edge_domain_system
+    from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum
+    from hybrid_model.consensus.exact.periodic_edge_domain import PeriodicGains, period_map, periodic_gains
+    from hybrid_model.consensus.excitation.joint import JointExcitation, joint_excitation
+    from hybrid_model.consensus.excitation.persistence import ExcitationConstants, WindowExtremes, scenario_excitation
+    from hybrid_model.consensus.excitation.trees import tree_excitations
+    from hybrid_model.consensus.graphs.digraphs import BalancedSwitching
+    from hybrid_model.consensus.graphs.generators import (
+        AgentGraph,
+        agent_graph,
+        complete_graph,
+        erdos_renyi_graph,
+        geometric_graph,
+        path_graph,
+        regular_graph,
+        ring_graph,
+        small_world_graph,
+        star_graph,
+    )
+    from hybrid_model.consensus.graphs.spanning_trees import TreePartition, all_spanning_trees, spanning_tree_count
+    from hybrid_model.consensus.laws.agents import Integrator, agent
+    from hybrid_model.consensus.laws.closed_loop import broadcast_wires, closed_loop, scenario_agents
+    from hybrid_model.consensus.laws.double_integrators import (
+        double_integrator_agents,
+        double_integrator_loop,
+        double_integrator_wires,
+    )
+    from hybrid_model.consensus.laws.threshold_triggers import (
+        DynamicTrigger,
+        EventGenerator,
+        MixedTrigger,
+        StaticTrigger,
+    )
+    from hybrid_model.consensus.laws.vector_agents import vector_agents, vector_loop, vector_wires
+    from hybrid_model.consensus.messages import ScenarioError
+    from hybrid_model.consensus.runs.communication import communication, gap_statistics
+    from hybrid_model.consensus.runs.metrics import performance, run_metrics
+    from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
+    from hybrid_model.consensus.runs.savings import Savings, run_savings
+    from hybrid_model.consensus.scenario.channel import Channel
+    from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
+    from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
+    from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
+    from hybrid_model.consensus.switching.cycle import PeriodicSwitching
+    from hybrid_model.consensus.switching.joint_connectivity import joint_connectivity_window
+    from hybrid_model.consensus.switching.random_sequences import (
+        jointly_connected_sequence,
+        markov_sequence,
+        random_dwell_sequence,
+    )
+    from hybrid_model.consensus.switching.sequence import SequenceSwitching, SwitchingSequence
+    from hybrid_model.consensus.weights.constant import ConstantWeight, ConstantWeights
+    from hybrid_model.consensus.weights.distances import distance_weights, reliability_weight
+    from hybrid_model.consensus.weights.function import FunctionWeight, FunctionWeights
+    from hybrid_model.consensus.weights.gated_sine import GatedAbsoluteSineWeights, GatedSine, GatedSineWeights
+    from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
+    from hybrid_model.consensus.weights.sampled import SampledWeight
+    from hybrid_model.consensus.weights.sine import SineWeight, SineWeights
+    from hybrid_model.consensus.weights.square import SquareWeight, SquareWeights
+    from hybrid_model.consensus.weights.tabulated import TabulatedWeights
 
 __all__ = [
     "AgentGraph",
@@ -164,3 +174,5 @@ __all__ = [
     "vector_loop",
     "vector_wires",
 ]
+
+__getattr__ = lazily(__name__)

@@ -7,11 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 import numpy as np
-from scipy import sparse
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.layout import Layout
@@ -20,6 +19,9 @@ from hybrid_model.declare.transitions import Assignments, Trigger
 from hybrid_model.declare.variables import Kind, Values, Variable
 from hybrid_model.errors import TraceError
 from hybrid_model.native.symbols import expressions, symbol_vector, symbols
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 ARGUMENTS = ("t", "x", "z", "u", "p")
 """Arguments of every traced function, in order."""
@@ -76,6 +78,9 @@ class Trace:
         which = (self.start, "xz".index(part)) if name == "start" else (getattr(self, result), 0)
         function, row = which
         sparsity = function.jac_sparsity(row, ARGUMENTS.index(argument))
+        # Runs need no patterns, and this package takes long to import.
+        from scipy import sparse
+
         rows, columns = sparsity.get_triplet()
         shape = (function.size1_out(row), function.size1_in(ARGUMENTS.index(argument)))
         return sparse.csr_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=shape)

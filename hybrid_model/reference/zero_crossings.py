@@ -18,12 +18,11 @@ The C engine of exported FMUs (hybrid_model/engine/location/rises.c) decides in 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
-from scipy.special import comb
 
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.scales import ulp
@@ -45,7 +44,8 @@ def _matrices(degree: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     k = np.arange(degree + 1)
     points = 0.5 - 0.5 * np.cos(np.pi * k / degree)
     points[degree // 2] = 0.5  # exactly, so that a touch there is seen
-    bernstein = comb(degree, k) * points[:, None] ** k * (1.0 - points[:, None]) ** (degree - k)
+    choose = np.array([math.comb(degree, j) for j in range(degree + 1)], dtype=np.float64)
+    bernstein = choose * points[:, None] ** k * (1.0 - points[:, None]) ** (degree - k)
     chebyshev = np.polynomial.chebyshev.chebvander(2.0 * points - 1.0, degree)
     to_bernstein, to_chebyshev = (np.linalg.inv(np.asarray(m, dtype=np.float64)) for m in (bernstein, chebyshev))
     return points, to_bernstein, CAUTION * to_chebyshev[-2:]
@@ -156,6 +156,9 @@ def first_nonnegative(margin: Margin, a: float, b: float) -> float:
         return margin(t) or SMALLEST
 
     # Absolutely no coarser than the floats at the bracket's start, and relatively to rounding: zero may be close to b.
+    # Imported where a crossing is located: it takes longer to import than most runs take.
+    from scipy.optimize import brentq
+
     t = float(brentq(signed, a, b, xtol=max(2.0 * ulp(a), SMALLEST), rtol=8.9e-16, maxiter=2000))
     step = ulp(t)
     while margin(t) < 0.0:

@@ -7,8 +7,6 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import minimize_scalar
 
 from hybrid_model.declare.transitions import Priority
 from hybrid_model.declare.variables import FloatArray
@@ -190,6 +188,8 @@ class FlowCheck:
             fall = worst - min(badness[top - 1], badness[top + 1])
             # The peak of a parabola through the three lies above by less than a quarter of the fall.
             if worst + fall > 0.0:
+                from scipy.optimize import minimize_scalar
+
                 found = minimize_scalar(
                     lambda time: -self._badness(float(time), path(float(time)), k)[row],
                     bounds=(times[top - 1], times[top + 1]),
@@ -236,6 +236,8 @@ class FlowCheck:
             slope = rates(a, x)
             return lambda t: x + (t - a) * slope
         options = {"rtol": max(INTEGRATION * self._slack.rtol, 3e-14), "atol": INTEGRATION * self._slack.states}
+        from scipy.integrate import solve_ivp
+
         solution = solve_ivp(rates, (a, b), x, method=self._method, dense_output=True, **options)
         if solution.status != 0:
             raise FlowMapError(f"{self._method} cannot follow the flow map from t = {a:.9g} s: {solution.message}")

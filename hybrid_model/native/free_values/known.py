@@ -14,7 +14,6 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
-from scipy import special
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.class_body import UNBOUND
@@ -105,7 +104,7 @@ def needs_no_look(value: object) -> bool:
 
 def is_known_ufunc(ufunc: np.ufunc) -> bool:
     """Whether an element-wise function is one of numpy or scipy; one of `np.frompyfunc` holds another function."""
-    return any(getattr(module, ufunc.__name__, None) is ufunc for module in (np, special))
+    return any(getattr(module, ufunc.__name__, None) is ufunc for module in (np, sys.modules.get("scipy.special")))
 
 
 def is_of_library(module: str) -> bool:

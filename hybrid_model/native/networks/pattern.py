@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse
 
 from hybrid_model.declare.variables import Kind
 from hybrid_model.native.networks.evaluation_order import Call, Order
 from hybrid_model.native.networks.groups import Group
 from hybrid_model.native.networks.members import SOURCES, Members
+
+if TYPE_CHECKING:
+    import scipy.sparse
 
 Dependencies = frozenset[int]
 """Elements of t, x, z, u, p, numbered through in this order."""
@@ -42,6 +45,9 @@ class NetworkPattern:
         -------
         csr_array of bool, shape (elements of the result, elements of the argument)
         """
+        # Runs need no patterns, and this package takes long to import.
+        import scipy.sparse
+
         rows = self.dependencies(result)
         number = ARGUMENTS.index(argument)
         first, last = self._ends[number], self._ends[number + 1]
