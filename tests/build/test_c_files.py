@@ -9,6 +9,7 @@ import pytest
 
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files
 from hybrid_model.native.build.compiler import find_compiler
+from hybrid_model.native.build.objects import COMMON_FLAGS, STRICT_FLAGS
 
 pytestmark = pytest.mark.skipif(not shutil.which("nm"), reason="needs nm")
 PREFIXES = {"engine": "engine_", "networks": "network_", "interface": "instance_"}
@@ -22,8 +23,10 @@ def room_of(source):
 def symbols(source, folder):
     """Names that the object of a C file defines for others, and those that it asks for."""
     target = folder / f"{source.stem}.o"
-    includes = [*(f"-I{place}" for place in OWN_FOLDERS), f"-I{fmi_headers()}"]
-    subprocess.run([*find_compiler(), "-std=c99", "-c", source, *includes, "-o", target], check=True)
+    includes = [*(f"-I{place}" for place in OWN_FOLDERS), "-isystem", str(fmi_headers())]
+    # Users' compilers may warn of more than ours, which has to be content.
+    flags = [*COMMON_FLAGS, *STRICT_FLAGS, "-Werror"]
+    subprocess.run([*find_compiler(), *flags, "-c", source, *includes, "-o", target], check=True)
     lines = subprocess.run(["nm", "-g", target], capture_output=True, text=True, check=True).stdout.splitlines()
     found = [line.split()[-2:] for line in lines]
     return {name for kind, name in found if kind != "U"}, {name for kind, name in found if kind == "U"}

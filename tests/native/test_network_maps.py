@@ -57,7 +57,7 @@ class Compiled:
         subprocess.run([*common, *GENERATED_FLAGS, "-Werror", "-c", source, "-o", generated], check=True)
         runtime = {folder / f"{source.stem}.o": source for source in own_files("network*.c")}
         for target, own in runtime.items():
-            subprocess.run([*common, *STRICT_FLAGS, "-c", own, "-o", target], check=True)
+            subprocess.run([*common, *STRICT_FLAGS, "-Werror", "-c", own, "-o", target], check=True)
         subprocess.run([*common, "-shared", generated, *runtime, "-lm", "-o", library], check=True)
         self.library = ctypes.CDLL(str(library))
         self.sizes = traced.work_sizes
