@@ -23,9 +23,8 @@ SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-au
 _MOST_JUMPS = 20_000
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser = commands.add_parser("certify", help="bounds of a scenario beside what a run shows", allow_abbrev=False)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a preset, or path of a TOML file")
     parser.add_argument("--json", action="store_true", help="print the certificates as a JSON object")
     parser.add_argument(

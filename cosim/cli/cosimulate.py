@@ -7,7 +7,6 @@ import math
 import shutil
 import sys
 from pathlib import Path
-from typing import Any
 
 from cosim.cli.exits import UsageError, exit_of, given_values, progress, write_csv
 from cosim.consensus import fmu_system
@@ -33,9 +32,8 @@ FEWEST, MOST = 10, 100_000
 EVENT_EXACT, FIXED_STEP = "event-exact", "fixed-step"
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser = commands.add_parser("cosim", help="co-simulate a scenario's agents, or run one FMU", allow_abbrev=False)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
     parser.add_argument("system", metavar="SYSTEM", help="name of a preset, path of a TOML file, or an .fmu")
     parser.add_argument(
         "--master",

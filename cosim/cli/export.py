@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from importlib.machinery import ModuleSpec, SourceFileLoader
 from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from cosim.cli.exits import Exit, UsageError, progress, start_values
 from fmu.archives.checks import no_device
@@ -32,14 +31,9 @@ ALL = "all"
 _SOURCE = ".py"
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser = commands.add_parser(
-        "export",
-        help="export an automaton or a scenario's agents as FMUs",
-        description="Write an automaton, or each agent of a scenario, as a native FMU. Prints the files written.",
-        allow_abbrev=False,
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = "Write an automaton, or each agent of a scenario, as a native FMU. Prints the files written."
     parser.add_argument(
         "target",
         metavar="TARGET",

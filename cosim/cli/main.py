@@ -8,7 +8,6 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from types import ModuleType
 
 from cosim.cli.exits import Exit, UsageError
 from cosim.errors import CosimError
@@ -17,14 +16,14 @@ from hybrid_model import HybridModelError
 from hybrid_model.consensus.messages import ScenarioError
 
 _COMMANDS = {
-    "paper": "paper",
-    "simulate": "simulate",
-    "certify": "certify",
-    "export": "export",
-    "cosim": "cosimulate",
-    "validate": "validate",
+    "paper": ("paper", "reproduce the paper's simulations in all executions"),
+    "simulate": ("simulate", "run a scenario"),
+    "certify": ("certify", "bounds of a scenario beside what a run shows"),
+    "export": ("export", "export an automaton or a scenario's agents as FMUs"),
+    "cosim": ("cosimulate", "co-simulate a scenario's agents, or run one FMU"),
+    "validate": ("validate", "check anybody's FMU"),
 }
-"""Modules of this package."""
+"""Module of this package, and what it does."""
 _INTERRUPTED = 130
 """Status of a command that was interrupted from the keyboard, as shells have it."""
 
@@ -49,8 +48,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    for command in _modules(sys.argv[1:] if arguments is None else arguments):
-        command.add_parser(commands)
+    given = sys.argv[1:] if arguments is None else arguments
+    called = next((word for word in given if not word.startswith("-")), None)
+    for name, (module, purpose) in _COMMANDS.items():
+        command = commands.add_parser(name, help=purpose, allow_abbrev=False)
+        # Some take long to import.
+        if name == called:
+            importlib.import_module(f"cosim.cli.{module}").add_arguments(command)
     options = parser.parse_args(arguments)
     try:
         return int(options.run(options))
@@ -64,12 +68,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(Exit.DONE)
     except (HybridModelError, ExportError, BuildError, CosimError, OSError) as error:
         return _report(error, Exit.FAILED)
-
-
-def _modules(arguments: Sequence[str]) -> list[ModuleType]:
-    """Import the command that is called, since some take long to import; all of them for help and for slips."""
-    called = [name for name in arguments[:1] if name in _COMMANDS]
-    return [importlib.import_module(f"cosim.cli.{_COMMANDS[name]}") for name in called or _COMMANDS]
 
 
 def _write_any_name() -> None:

@@ -62,11 +62,8 @@ class Comparison:
     certificates: Certificates
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser = commands.add_parser(
-        "paper", help="reproduce the paper's simulations in all executions", allow_abbrev=False
-    )
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
     parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for all results")
     parser.set_defaults(run=run)
 

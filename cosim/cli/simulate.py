@@ -27,9 +27,8 @@ MOST_POINTS = 1e7
 """Of a trajectory; one that is longer fills the memory."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser = commands.add_parser("simulate", help="run a scenario", allow_abbrev=False)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
     parser.add_argument("scenario", metavar="SCENARIO", help="name of a preset, or path of a TOML file")
     parser.add_argument(
         "--engine",

@@ -6,7 +6,6 @@ import argparse
 import json
 import textwrap
 from pathlib import Path
-from typing import Any
 
 from cosim.cli.exits import Exit, UsageError, progress
 from fmu.validate.check import check_fmu
@@ -22,9 +21,9 @@ a number, a wrong token), broken additions (sources, manifests of layered standa
 notes are good to know. Exit status: 0 no error, 1 at least one error (with --strict: or warning), 2 wrong usage."""
 
 
-def add_parser(commands: Any) -> None:
-    """Add the command to the command line."""
-    parser = commands.add_parser("validate", help="check anybody's FMU", description=_DESCRIPTION, allow_abbrev=False)
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    parser.description = _DESCRIPTION
     parser.add_argument("fmu", metavar="FILE.fmu", type=Path)
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     parser.add_argument("--no-run", action="store_true", help="do not execute the FMU's native code")
