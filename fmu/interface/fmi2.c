@@ -230,9 +230,11 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
     (void)noSetFMUStatePriorToCurrentPoint;
     if (!instance)
         return fmi2Error;
+    if (instance_step_quietly(instance, currentCommunicationPoint, communicationStepSize))
+        return fmi2OK;
     EventPolicy policy = instance->run->stop_at_events ? EVENTS_STOP_AFTER : EVENTS_INSIDE;
     Answer answer =
-        instance_step(c, __func__, currentCommunicationPoint, communicationStepSize, policy, &report);
+        instance_step(instance, __func__, currentCommunicationPoint, communicationStepSize, policy, &report);
     return answer == ANSWER_OK && (report.early || report.terminate) ? fmi2Discard : status_of(answer);
 }
 

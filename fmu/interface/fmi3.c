@@ -23,6 +23,21 @@ static Fmi3 prototype(Interface interface, fmi3String name, fmi3Boolean logging,
     return made;
 }
 
+/* Shows the importer the state on the way of a step; it may ask for the step to end there or soon after. */
+static double show_intermediate(void *context, double time, double target)
+{
+    Fmi3 *own = context;
+    Run *run = own->base.run;
+    bool may_end = own->base.early_return_allowed, asked = false;
+    fmi3Float64 end = target;
+    run->mode = MODE_INTERMEDIATE;
+    own->update(own->environment, time, true, true, true, may_end, &asked, &end);
+    run->mode = MODE_STEP;
+    if (!may_end || !asked || !(end < target))
+        return target;
+    return end > time ? end : time;
+}
+
 /* ---- life cycle ---- */
 
 const char *fmi3GetVersion(void)
@@ -71,7 +86,10 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     made.base.event_mode_used = eventModeUsed;
     made.base.early_return_allowed = earlyReturnAllowed;
     made.update = intermediateUpdate;
-    return instance_new(&made.base, sizeof made, __func__, instantiationToken);
+    Instance *instance = instance_new(&made.base, sizeof made, __func__, instantiationToken);
+    if (instance && intermediateUpdate)
+        engine_set_hook(instance->engine, show_intermediate, instance);
+    return instance;
 }
 
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3String instantiationToken,
@@ -143,21 +161,6 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 /* ---- Co-Simulation ---- */
 
-/* Shows the importer the state on the way of a step; it may ask for the step to end there or soon after. */
-static double show_intermediate(void *context, double time, double target)
-{
-    Fmi3 *own = context;
-    Run *run = own->base.run;
-    bool may_end = own->base.early_return_allowed, asked = false;
-    fmi3Float64 end = target;
-    run->mode = MODE_INTERMEDIATE;
-    own->update(own->environment, time, true, true, true, may_end, &asked, &end);
-    run->mode = MODE_STEP;
-    if (!may_end || !asked || !(end < target))
-        return target;
-    return end > time ? end : time;
-}
-
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
                       fmi3Boolean noSetFMUStatePriorToCurrentPoint, fmi3Boolean *eventHandlingNeeded,
                       fmi3Boolean *terminateSimulation, fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime)
@@ -169,13 +172,17 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
         return fmi3Error;
     if (!eventHandlingNeeded || !terminateSimulation || !earlyReturn || !lastSuccessfulTime)
         return status_of(instance_null_argument(&own->base, __func__));
+    if (instance_step_quietly(&own->base, currentCommunicationPoint, communicationStepSize)) {
+        *eventHandlingNeeded = *terminateSimulation = *earlyReturn = false;
+        *lastSuccessfulTime = own->base.run->time;
+        return fmi3OK;
+    }
     bool events = own->base.event_mode_used;
     EventPolicy policy = !events                          ? EVENTS_INSIDE
                          : own->base.early_return_allowed ? EVENTS_STOP
                                                           : EVENTS_INSIDE_BEFORE_END;
-    engine_set_hook(own->base.engine, own->update ? show_intermediate : NULL, own);
     Answer answer =
-        instance_step(own, __func__, currentCommunicationPoint, communicationStepSize, policy, &report);
+        instance_step(&own->base, __func__, currentCommunicationPoint, communicationStepSize, policy, &report);
     *eventHandlingNeeded = events && report.event;
     *terminateSimulation = report.terminate;
     *earlyReturn = own->base.early_return_allowed && report.early;

@@ -154,8 +154,11 @@ typedef struct {
     double reached;
 } StepReport;
 
-/* `policy` is what to do with events on the way. */
-Answer instance_step(void *handle, const char *function, double point, double size, EventPolicy policy,
+/* Makes a step of an instance in Step Mode in a few comparisons, as most are made: it begins where the last one ended,
+   and it is known already that nothing happens on it.  False if instance_step has to look. */
+bool instance_step_quietly(const Instance *instance, double point, double size);
+/* `policy` is what to do with events on the way.  The instance is in Step Mode. */
+Answer instance_step(Instance *instance, const char *function, double point, double size, EventPolicy policy,
                      StepReport *report);
 
 /* continuous.c: Model Exchange */

@@ -1,4 +1,5 @@
 /* Steps of Co-Simulation. */
+#include <float.h>
 #include <math.h>
 
 #include "instance.h"
@@ -36,16 +37,27 @@ static Answer check_step(const Instance *instance, const char *function, double 
     return ANSWER_OK;
 }
 
-Answer instance_step(void *handle, const char *function, double point, double size, EventPolicy policy,
+bool instance_step_quietly(const Instance *instance, double point, double size)
+{
+    Run *run = instance->run;
+    double target = point + size;
+    if (!(size > 0.0) || !(target <= run->stop_time) || !(target <= DBL_MAX) || run->end_reported ||
+        !(fabs(point - run->time) <= 16.0 * DBL_EPSILON * fabs(run->time)) ||
+        !engine_advance_quietly(instance->engine, target))
+        return false;
+    run->time = target;
+    return true;
+}
+
+Answer instance_step(Instance *instance, const char *function, double point, double size, EventPolicy policy,
                      StepReport *report)
 {
-    Instance *instance = instance_enter(handle, function, MODE_STEP);
-    double target = point + size;
-    *report = (StepReport){.reached = instance ? instance->run->time : 0.0};
-    if (!instance || check_step(instance, function, point, size, target) != ANSWER_OK)
-        return ANSWER_ERROR;
     Engine *engine = instance->engine;
     Run *run = instance->run;
+    double target = point + size;
+    *report = (StepReport){.reached = run->time};
+    if (check_step(instance, function, point, size, target) != ANSWER_OK)
+        return ANSWER_ERROR;
     Advance advance = engine_advance(engine, target, policy);
     double end = engine_target(engine);
     bool reached = advance == ADVANCE_REACHED || advance == ADVANCE_EVENT_AT_TARGET;

@@ -75,7 +75,7 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     engine->margins = take(&cursor, rows * sizeof(double));
     engine->enabled = take(&cursor, rows * sizeof(double));
     engine->times = take(&cursor, m->n_times * sizeof(double));
-    engine->samples = take(&cursor, (N_SAMPLES + 1) * rows * sizeof(double));
+    engine->samples = take(&cursor, N_SAMPLES * rows * sizeof(double));
     engine->outputs = take(&cursor, m->n_outputs * sizeof(double));
     engine->rates = take(&cursor, vector);
     engine->indicators = take(&cursor, rows * sizeof(double));
@@ -133,8 +133,9 @@ size_t engine_block_size(const Engine *engine)
     return engine->block_size;
 }
 
-void engine_save(const Engine *engine, void *block)
+void engine_save(Engine *engine, void *block)
 {
+    engine_catch_up(engine);
     memcpy(block, engine->block, engine->block_size);
 }
 
@@ -172,9 +173,10 @@ static bool segment_is_sound(const Engine *engine)
 {
     const Status *status = engine->status;
     bool sound =
-        isfinite(status->segment_begin) && isfinite(status->segment_end) && status->segment_begin < status->segment_end;
+        isfinite(status->segment_begin) && isfinite(status->segment_end) &&
+        status->segment_begin < status->segment_end && status->segment_quiet <= status->segment_end;
     sound = sound && all_finite(engine->segment, engine->method->n_vectors * engine->model->n_states);
-    return sound || !status->has_segment;
+    return (sound || !status->has_segment) && !status->behind;
 }
 
 bool engine_block_is_sound(const Engine *engine, void *block)
@@ -185,7 +187,7 @@ bool engine_block_is_sound(const Engine *engine, void *block)
     const Status *status = other.status;
     bool sound =
         status->ending >= ENDED_NOT && status->ending <= ENDED_JUMPS && status->prediction >= PREDICTION_NONE &&
-        status->prediction <= PREDICTION_QUIET && memchr(status->message, '\0', sizeof status->message) != NULL &&
+        status->prediction <= PREDICTION_STEP && memchr(status->message, '\0', sizeof status->message) != NULL &&
         isfinite(status->start_time) && status->floor >= 0.0 && isfinite(status->floor) && !isnan(status->stop_time) &&
         isfinite(status->jumps_time) && isfinite(status->recent_time);
     for (size_t i = 0; i < N_RECENT; i++)

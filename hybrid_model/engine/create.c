@@ -18,8 +18,10 @@ Engine *engine_create(const Model *m, size_t wrapper_size)
         return NULL;
     }
     for (size_t j = 0; j < m->n_jumps; j++)
-        if (m->jumps[j].kind == JUMP_ON_STATE)
+        if (m->jumps[j].kind == JUMP_ON_STATE) {
             engine->is_guard[m->jumps[j].index] = 1;
+            engine->n_guards++;
+        }
     engine_reset(engine);
     return engine;
 }

@@ -42,12 +42,3 @@ void engine_segment_keep(Engine *engine)
     status->segment_end = engine->step.t1;
     status->has_segment = true;
 }
-
-void engine_segment_read(Engine *engine, double t)
-{
-    const Status *status = engine->status;
-    double a = (t - status->segment_begin) / (status->segment_end - status->segment_begin);
-    *engine->live.time = t;
-    engine->method->interpolate(engine->segment, engine->model->n_states, a, engine->live.x);
-    engine_note_sizes(engine, &engine->live);
-}

@@ -8,6 +8,8 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
+#include <string.h>
 
 #include "model.h"
 
@@ -85,7 +87,7 @@ void *engine_wrapper(Engine *engine);
 void engine_reset(Engine *engine);
 
 size_t engine_block_size(const Engine *engine);
-void engine_save(const Engine *engine, void *block);
+void engine_save(Engine *engine, void *block);
 void engine_restore(Engine *engine, const void *block);
 /* Whether a block that comes from outside (aligned as malloc does) could be one of this engine's. */
 bool engine_block_is_sound(const Engine *engine, void *block);
@@ -137,6 +139,8 @@ bool engine_jump(Engine *engine, bool *states_changed);
 /* Takes all enabled visible jumps, one after the other. */
 bool engine_jump_all(Engine *engine);
 Advance engine_advance(Engine *engine, double target, EventPolicy policy);
+/* The same in a few comparisons, where it is known already that nothing happens up to there; false if it is not. */
+bool engine_advance_quietly(Engine *engine, double target);
 
 /* Looks ahead to the next visible event, at most to `limit` (may be infinite); its time, or that of
    the limit if nothing happens before.  False if that is not ahead.  The state there is kept, and
@@ -185,8 +189,18 @@ const char *engine_problem(const Engine *engine);
 /* Drops what truncation left of a UTF-8 character at the end of a text. */
 void engine_end_text(char *text);
 
-/* The distance from |t| to the next larger double. */
-double engine_time_ulp(double t);
+/* The distance from |t| to the next larger double: doubles above zero follow each other as their bits do. */
+static inline double engine_time_ulp(double t)
+{
+    double size, next;
+    uint64_t bits;
+    memcpy(&bits, &t, sizeof bits);
+    bits &= UINT64_MAX >> 1;
+    memcpy(&size, &bits, sizeof size);
+    bits++;
+    memcpy(&next, &bits, sizeof next);
+    return next - size;
+}
 
 #if defined(__GNUC__)
 #pragma GCC visibility pop

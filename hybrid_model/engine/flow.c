@@ -55,6 +55,10 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
             bool reached = locate && engine->problem == ENDED_NOT_FINITE && engine_reach_guard(engine, point, end);
             return reached ? FLOW_EVENT : FLOW_PROBLEM;
         }
+        if (engine->keeps && point == &engine->predicted) {
+            engine_segment_keep(engine);
+            engine->keeps = false;
+        }
         if (locate) {
             FlowEnd found = engine_locate_event(engine, point, level, piece_end);
             if (found != FLOW_REACHED)
@@ -73,15 +77,16 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
 
 /* Takes a guard that is crossed within one instant before a time event to that event's instant, where
    the order of the table decides and not rounding. */
-static FlowEnd go_on_to(Engine *engine, const Point *point, double time_event, size_t *budget)
+static FlowEnd go_on_to(Engine *engine, const Point *point, double time_event)
 {
+    size_t budget = INSTANT_STEPS;
     const Model *m = engine->model;
     double *enabled = engine->enabled;
     if (!engine_evaluate_margins(engine, *point->time, point->x, point->z))
         return FLOW_PROBLEM;
     for (size_t i = 0; i < m->n_margins; i++)
         enabled[i] = engine->margins[i] >= point->level[i] ? 1.0 : 0.0;
-    FlowEnd result = flow_piece(engine, point, time_event, time_event, false, budget);
+    FlowEnd result = flow_piece(engine, point, time_event, time_event, false, &budget);
     if (result != FLOW_REACHED || !engine_evaluate_margins(engine, *point->time, point->x, point->z))
         return result == FLOW_REACHED ? FLOW_PROBLEM : result;
     for (size_t i = 0; i < m->n_margins; i++)
@@ -104,7 +109,7 @@ FlowEnd engine_flow(Engine *engine, const Point *point, double limit, bool locat
         FlowEnd result = flow_piece(engine, point, limit, piece_end, locate, budget);
         bool near = piece_end <= limit && piece_end - *point->time <= engine_one_instant(engine, piece_end);
         if (result == FLOW_EVENT && near && *point->time < piece_end) /* line 15 */
-            result = go_on_to(engine, point, piece_end, budget);
+            result = go_on_to(engine, point, piece_end);
         /* At an event the loop begins anew: a breakpoint of the same instant may come before it. */
         if (result != FLOW_REACHED && result != FLOW_EVENT)
             return result;

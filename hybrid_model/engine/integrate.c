@@ -58,8 +58,11 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
     const Method *method = engine->method;
     double t0 = *point->time, remaining = limit - t0, h = *point->step;
     bool rejected = false;
-    if (h <= 0.0 && !engine_first_step(engine, point, limit, engine_largest_state(engine, point, point->x), &h))
-        return false;
+    if (h <= 0.0) {
+        if (!engine_first_step(engine, point, limit, engine_largest_state(engine, point, point->x), &h))
+            return false;
+        h = fmax(h, fmin(engine->status->stride, engine->model->scales.first_growth * h));
+    }
     h = fmin(h, engine->options.longest_step);
     for (;;) {
         /* The last two steps share what remains, so that no sliver is left. */

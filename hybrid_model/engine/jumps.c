@@ -51,7 +51,7 @@ static bool accept_state(Engine *engine, size_t jump, const Point *point)
                            "Remedy: round it in that map, or declare it without integer.");
     engine_copy(point->x, engine->reset.x, m->n_states + m->n_discrete);
     engine_note_sizes(engine, point);
-    *point->step = 0.0;
+    engine_begin_anew(engine, point);
     return true;
 }
 
@@ -237,6 +237,7 @@ bool engine_start(Engine *engine)
 size_t engine_pending(Engine *engine)
 {
     size_t jump;
+    engine_catch_up(engine);
     if (engine->status->ending != ENDED_NOT || !engine_first_enabled(engine, &engine->live, &jump))
         return engine->model->n_jumps;
     return jump;
@@ -246,6 +247,7 @@ bool engine_jump(Engine *engine, bool *states_changed)
 {
     size_t jump, n = engine->model->n_states;
     *states_changed = false;
+    engine_catch_up(engine);
     if (engine->status->ending != ENDED_NOT)
         return false;
     if (!engine_take_internal_jumps(engine, &engine->live) || !engine_first_enabled(engine, &engine->live, &jump))

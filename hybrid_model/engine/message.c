@@ -33,6 +33,7 @@ bool engine_fail(Engine *engine, Ending ending, const char *format, ...)
 bool engine_end_run(Engine *engine)
 {
     engine->status->ending = (int32_t)engine->problem;
+    engine->status->has_segment = false;
     memcpy(engine->status->message, engine->problem_message, sizeof engine->problem_message);
     return false;
 }

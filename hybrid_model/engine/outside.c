@@ -5,6 +5,7 @@
 
 bool engine_next_time_event(Engine *engine, bool breakpoints, double *event_time)
 {
+    engine_catch_up(engine);
     if (engine->status->ending != ENDED_NOT || !engine_evaluate_times(engine, &engine->live))
         return false;
     *event_time = engine_next_time(engine, &engine->live, true, breakpoints);
@@ -15,6 +16,7 @@ bool engine_arrive(Engine *engine)
 {
     double next;
     double *now = engine->live.time;
+    engine_leave_segment(engine);
     engine->view = VIEW_NONE;
     if (!engine_evaluate_times(engine, &engine->live))
         return false;
@@ -29,6 +31,7 @@ bool engine_may_flow(Engine *engine)
     const Point *live = &engine->live;
     double margin;
     bool out;
+    engine_leave_segment(engine);
     if (engine->status->ending != ENDED_NOT)
         return false;
     if (!engine->model->has_flow_set)

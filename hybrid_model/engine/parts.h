@@ -22,8 +22,9 @@
 /* Without a stop time a look ahead ends after so many times the present time, or what the flow shows of its own. */
 #define LOOK_AHEAD_TIMES 1e6
 #define LOOK_AHEAD_EVENTS 1e3
-/* So many steps of the importer are looked ahead at once. */
-#define STEPS_AHEAD 64.0
+#define INSTANT_STEPS 1000
+/* A look ahead of one step of the solver goes no further than so many steps of the importer. */
+#define STEPS_AHEAD 1000.0
 /* A step that communication points are read from is that much shorter than its error allows: the error of the
    interpolation is some ten times as great, and falls with the fifth power. */
 #define SEGMENT_PART 0.35
@@ -65,7 +66,9 @@ typedef struct {
 
 typedef struct Method Method;
 
-typedef enum { PREDICTION_NONE, PREDICTION_EVENT, PREDICTION_RENEWAL, PREDICTION_QUIET } Prediction;
+/* What is known of the time up to the predicted point: that an event is there, that a look ahead ended there for its
+   limit of steps, that nothing happens before it, or that nothing happens on the solver's step that leads there. */
+typedef enum { PREDICTION_NONE, PREDICTION_EVENT, PREDICTION_RENEWAL, PREDICTION_QUIET, PREDICTION_STEP } Prediction;
 
 /* The times of one jump, for the Zeno guard. */
 typedef struct {
@@ -88,9 +91,11 @@ typedef struct {
     uint64_t n_recent;            /* so many they are, of which the last ones are kept */
     uint32_t recent[N_RECENT];
     uint64_t jumps_taken;         /* in the last advance */
-    /* The live point lies on a step of the solver that goes on to segment_end. */
-    double segment_begin, segment_end;
+    double stride;                /* what a first step may take from the steps before the last jump or change, or 0 */
+    /* The live point lies on a step of the solver that goes on to segment_end; before segment_quiet nothing happens. */
+    double segment_begin, segment_end, segment_quiet;
     int32_t has_segment;
+    int32_t behind;               /* the live point's states do not belong to its time yet: see engine_catch_up */
     int32_t has_inner_rates;
     int32_t settled;              /* nothing has changed from outside since the last advance */
     int32_t prediction;
@@ -132,6 +137,7 @@ struct Engine {
     double *slopes;               /* rates and outputs on both sides of a point */
     double *unit;                 /* a direction */
     unsigned char *is_guard;      /* of each margin: some jump waits for it */
+    size_t n_guards;              /* jumps that wait for one */
     Point reset, shown;           /* result of a reset map; what a view shows */
     View view;
     bool has_outputs, has_rates, has_indicators;
@@ -140,6 +146,7 @@ struct Engine {
     JumpHook jump_hook;
     void *jump_context;
     double target;                /* of the present advance */
+    bool keeps;                   /* the next step of the predicted point is kept as the segment */
     double largest;               /* state of the present step */
     EngineOptions options;
     Statistics statistics;
@@ -154,7 +161,7 @@ struct Engine {
 typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_CHANGED, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
 
 /* The files of the engine from the lowest to the highest: each calls functions of those before it only.  Those of
-   engine.h are in message.c, block.c, recorder.c, values.c, jumps.c, create.c, views.c, sensitivity.c (after
+   engine.h are in message.c, segment.c, block.c, recorder.c, values.c, jumps.c, create.c, views.c, sensitivity.c (after
    differences.c), predict.c, outside.c and engine.c, the last ones; samples.c, rises.c and crossings.c, before
    locate.c, are in search.h; methods, before create.c, in method.h. */
 
@@ -167,6 +174,13 @@ bool engine_end_run(Engine *engine);
 ModelName engine_state_name(const Model *m, size_t i);
 /* The values of a state for a message: "h = 0.1, v = -4.4". */
 const char *engine_describe_state(const Engine *engine, const double *x, const double *z, char *text, size_t size);
+
+/* segment.c */
+/* Moves the live point along the segment; its states follow when they are asked for. */
+void engine_segment_move(Engine *engine, double t);
+/* Brings the live point's states to its time: whatever uses them calls this first.  Nothing that the run depends on
+   changes by it, so that a run is the same whoever looks at it. */
+void engine_catch_up(Engine *engine);
 
 /* block.c */
 void engine_copy(double *to, const double *from, size_t n);
@@ -192,8 +206,12 @@ double engine_largest_state(const Engine *engine, const Point *point, const doub
 double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size);
 /* The point has got where it is: its states are among those that the run has shown. */
 void engine_note_sizes(const Engine *engine, const Point *point);
+/* The flow begins anew at the point: with a first step, for which the steps before are a guide. */
+void engine_begin_anew(const Engine *engine, const Point *point);
 /* Guards are enabled from zero on. */
 void engine_clear_levels(const Engine *engine, const Point *point);
+/* The live point goes on by itself from where it is on a segment, if it is on one. */
+void engine_leave_segment(Engine *engine);
 /* Something that the future depends on has changed. */
 void engine_changed(Engine *engine);
 
@@ -230,8 +248,6 @@ const double *engine_step_vectors(Engine *engine);
 void engine_step_dense(Engine *engine, double t);
 /* Keeps the present step as a segment on which the live point moves. */
 void engine_segment_keep(Engine *engine);
-/* Moves the live point along the segment. */
-void engine_segment_read(Engine *engine, double t);
 
 /* recorder.c */
 /* Keeps the present step up to `end`, where the states are x. */
@@ -307,11 +323,9 @@ double engine_next_time(Engine *engine, const Point *point, bool visible, bool i
 FlowEnd engine_flow(Engine *engine, const Point *point, double limit, bool locate, size_t *budget);
 
 /* predict.c */
-typedef enum { ON_THE_WAY, AT_PREDICTED_EVENT, NOT_PREDICTED } Progress;
-/* Looks ahead where that saves work: after a step in which nothing came from outside, for as many more. */
-void engine_look_ahead(Engine *engine);
-/* Uses the prediction, if there is one, as far as it carries. */
-Progress engine_follow_prediction(Engine *engine, EventPolicy policy, size_t *budget, FlowEnd *end);
+/* Flows the live point to the target or to the first event.  What is foreseen is used, and with `ahead` the flow is
+   looked at a step of the solver at a time; `foreseen` tells whether the event is one that was seen ahead. */
+FlowEnd engine_flow_on(Engine *engine, EventPolicy policy, bool ahead, size_t *budget, bool *foreseen);
 /* The target lies a rounding or less than an instant behind the event: go there if the event is still due then and no
    breakpoint lies between; otherwise the point stays at the event. */
 void engine_flow_past_event(Engine *engine, double target);

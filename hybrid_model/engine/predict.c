@@ -35,6 +35,7 @@ bool engine_predict(Engine *engine, double limit, double *event_time)
     Status *status = engine->status;
     double now = *engine->live.time;
     size_t budget = look_ahead_steps(engine);
+    engine_leave_segment(engine);
     status->prediction = PREDICTION_NONE;
     if (status->ending != ENDED_NOT)
         return false;
@@ -51,22 +52,44 @@ bool engine_predict(Engine *engine, double limit, double *event_time)
 
 bool engine_foresees(const Engine *engine)
 {
-    return engine->status->prediction == PREDICTION_EVENT;
+    return engine->model->predictable && engine->status->prediction == PREDICTION_EVENT;
 }
 
-void engine_look_ahead(Engine *engine)
+/* Until when nothing happens where what is known ends at `known`, maybe with an event: a guard that is crossed a little
+   behind a target may count as reached with it. */
+static double quiet_until(const Engine *engine, double known)
+{
+    return known - fmax(4.0 * engine_time_ulp(known), engine_one_instant(engine, known));
+}
+
+static void keep_segment(Engine *engine, double known)
+{
+    engine_segment_keep(engine);
+    engine->status->segment_quiet = fmin(engine->status->segment_end, quiet_until(engine, known));
+}
+
+/* Looks ahead as far as one step of the solver goes, along which the live point then moves; false if it fails. */
+static bool look_one_step_ahead(Engine *engine)
 {
     Status *status = engine->status;
-    double event, now = *engine->live.time;
-    if (status->settled && status->prediction == PREDICTION_NONE && engine->model->predictable && !engine->hook &&
-        engine->record == RECORD_NOTHING) {
-        double limit = now + STEPS_AHEAD * (engine->target - now);
-        engine_predict(engine, fmin(limit, fmax(status->stop_time, engine->target)), &event);
-        /* Nobody has been told to come back where the budget ended: up to there it is quiet. */
-        if (status->prediction == PREDICTION_RENEWAL)
-            status->prediction = PREDICTION_QUIET;
+    const Point *ahead = &engine->predicted;
+    double now = *engine->live.time, limit = now + STEPS_AHEAD * (engine->target - now);
+    size_t budget = 1;
+    if (!engine_take_internal_jumps(engine, &engine->live))
+        return false;
+    engine_copy_point(engine, &engine->live, ahead);
+    *ahead->step *= SEGMENT_PART;
+    engine->keeps = true;
+    FlowEnd end = engine_flow(engine, ahead, fmin(limit, fmax(status->stop_time, engine->target)), true, &budget);
+    engine->keeps = false;
+    if (end == FLOW_PROBLEM) {
+        status->has_segment = false;
+        return false;
     }
-    status->settled = true;
+    status->prediction = end == FLOW_EVENT ? PREDICTION_EVENT : PREDICTION_STEP;
+    if (status->has_segment)
+        status->segment_quiet = fmin(status->segment_end, quiet_until(engine, *ahead->time));
+    return true;
 }
 
 /* Whether a breakpoint is due at the live point or comes up to `target`; the times must be there. */
@@ -90,28 +113,30 @@ void engine_flow_past_event(Engine *engine, double target)
         engine_copy_point(engine, &engine->shown, &engine->live);
 }
 
-/* Follows the solver's own steps to the target where nothing is to happen up to `quiet_until`: a target within
-   a step is read from its interpolation.  False if a step fails; the live point is then at the start of that step. */
-static bool follow_steps(Engine *engine, double target, double quiet_until)
+/* Follows the solver's own steps to the target where nothing is to happen up to there: a target within a step is read
+   from its interpolation.  False if a step fails; the live point is then at the start of that step. */
+static bool follow_steps(Engine *engine, double target)
 {
     Status *status = engine->status;
+    const Point *live = &engine->live;
+    double known = *engine->predicted.time;
     while (!status->has_segment || target >= status->segment_end) {
         if (status->has_segment)
-            engine_segment_read(engine, status->segment_end);
-        status->has_segment = false;
-        if (!engine_take_internal_jumps(engine, &engine->live))
+            engine_segment_move(engine, status->segment_end);
+        engine_leave_segment(engine);
+        if (!engine_take_internal_jumps(engine, live))
             return false;
-        if (*engine->live.time >= target)
+        if (*live->time >= target)
             return true;
-        engine_clear_levels(engine, &engine->live);
-        double limit = fmin(quiet_until, engine_next_time(engine, &engine->live, false, true));
-        if (*engine->live.step > 0.0)
-            limit = fmin(limit, *engine->live.time + SEGMENT_PART * *engine->live.step);
-        if (!engine_step_begin(engine, &engine->live) || !engine_step_accept(engine, &engine->live, limit))
+        engine_clear_levels(engine, live);
+        double limit = fmin(known, engine_next_time(engine, live, false, true));
+        if (*live->step > 0.0)
+            limit = fmin(limit, *live->time + SEGMENT_PART * *live->step);
+        if (!engine_step_begin(engine, live) || !engine_step_accept(engine, live, limit))
             return false;
-        engine_segment_keep(engine);
+        keep_segment(engine, known);
     }
-    engine_segment_read(engine, target);
+    engine_segment_move(engine, target);
     return true;
 }
 
@@ -125,24 +150,41 @@ static bool reached_with(Engine *engine, EventPolicy policy, double event)
            engine_evaluate_times(engine, &engine->live) && engine_next_time(engine, &engine->live, true, false) > event;
 }
 
-Progress engine_follow_prediction(Engine *engine, EventPolicy policy, size_t *budget, FlowEnd *end)
+/* Whether the target comes before anything that is foreseen. */
+static bool target_is_quiet(Engine *engine, EventPolicy policy)
 {
-    double event = *engine->predicted.time, target = engine->target;
-    Prediction prediction = (Prediction)engine->status->prediction;
-    bool quiet = prediction == PREDICTION_QUIET;
-    if (prediction == PREDICTION_NONE)
-        return NOT_PREDICTED;
-    if (quiet ? target <= event
-              : target < event - 4.0 * engine_time_ulp(event) && !reached_with(engine, policy, event)) {
-        /* A hook wants to see each step, so none may go beyond the target. */
-        if (engine->hook || !follow_steps(engine, target, event))
-            *end = engine_flow(engine, &engine->live, target, false, budget);
-        return ON_THE_WAY;
+    double known = *engine->predicted.time, target = engine->target;
+    switch ((Prediction)engine->status->prediction) {
+    case PREDICTION_STEP: return engine->status->has_segment && target < engine->status->segment_quiet;
+    case PREDICTION_QUIET: return target <= known;
+    default: return target < known - 4.0 * engine_time_ulp(known) && !reached_with(engine, policy, known);
     }
-    engine->status->has_segment = false;
-    engine->status->prediction = PREDICTION_NONE;
-    if (quiet)
-        return NOT_PREDICTED;
-    engine_copy_point(engine, &engine->predicted, &engine->live);
-    return AT_PREDICTED_EVENT;
+}
+
+FlowEnd engine_flow_on(Engine *engine, EventPolicy policy, bool ahead, size_t *budget, bool *foreseen)
+{
+    Status *status = engine->status;
+    const Point *live = &engine->live;
+    for (; *budget > 0; --*budget) {
+        if (status->prediction == PREDICTION_NONE && !(ahead && look_one_step_ahead(engine)))
+            break;
+        if (target_is_quiet(engine, policy)) {
+            /* A hook wants to see each step, so none may go beyond the target. */
+            bool followed = !engine->hook && follow_steps(engine, engine->target);
+            return followed ? FLOW_REACHED : engine_flow(engine, live, engine->target, false, budget);
+        }
+        Prediction prediction = (Prediction)status->prediction;
+        status->prediction = PREDICTION_NONE;
+        /* A crossing shortly behind the target is looked for from here: it may count as reached. */
+        bool beyond = engine->target > *engine->predicted.time;
+        if (prediction == PREDICTION_QUIET || (prediction == PREDICTION_STEP && !beyond))
+            break;
+        status->has_segment = false;
+        engine_copy_point(engine, &engine->predicted, live);
+        *foreseen = prediction != PREDICTION_STEP;
+        if (*foreseen)
+            return FLOW_EVENT;
+    }
+    engine_leave_segment(engine);
+    return engine_flow(engine, live, engine->target, true, budget);
 }

@@ -4,12 +4,6 @@
 
 #include "parts.h"
 
-double engine_time_ulp(double t)
-{
-    double size = fabs(t);
-    return nextafter(size, INFINITY) - size;
-}
-
 double engine_state_size(const Engine *engine, const Point *point, size_t i, double x)
 {
     double nominal = engine->model->nominals[i];
@@ -41,8 +35,18 @@ double engine_error_scale(const Engine *engine, const Point *point, size_t i, do
 
 void engine_note_sizes(const Engine *engine, const Point *point)
 {
-    for (size_t i = 0; i < engine->model->n_states; i++)
-        point->size[i] = fmax(point->size[i], fabs(point->x[i]));
+    for (size_t i = 0; i < engine->model->n_states; i++) {
+        double size = fabs(point->x[i]);
+        if (size > point->size[i])
+            point->size[i] = size;
+    }
+}
+
+void engine_begin_anew(const Engine *engine, const Point *point)
+{
+    if (*point->step > 0.0)
+        engine->status->stride = SEGMENT_PART * *point->step;
+    *point->step = 0.0;
 }
 
 void engine_clear_levels(const Engine *engine, const Point *point)
@@ -81,13 +85,22 @@ bool engine_rates(Engine *engine, double t, const double *x, const double *z, do
                        engine->model->name, t);
 }
 
+void engine_leave_segment(Engine *engine)
+{
+    if (!engine->status->has_segment)
+        return;
+    engine_catch_up(engine);
+    engine_note_sizes(engine, &engine->live);
+    engine->status->has_segment = false;
+}
+
 /* Something that the future depends on has changed. */
 void engine_changed(Engine *engine)
 {
-    *engine->live.step = 0.0;
+    engine_leave_segment(engine);
+    engine_begin_anew(engine, &engine->live);
     engine->status->prediction = PREDICTION_NONE;
     engine->status->settled = false;
-    engine->status->has_segment = false;
     engine->view = VIEW_NONE;
 }
 
@@ -108,6 +121,7 @@ void engine_set_span(Engine *engine, double start, double stop)
 
 void engine_set_time(Engine *engine, double t)
 {
+    engine_leave_segment(engine);
     *engine->live.time = t;
     engine_clear_levels(engine, &engine->live);
     engine_changed(engine);
@@ -120,12 +134,14 @@ double engine_time(const Engine *engine)
 
 void engine_set(Engine *engine, Bank bank, size_t index, double value)
 {
+    engine_catch_up(engine);
     double *values = bank == BANK_STATE      ? engine->live.x
                      : bank == BANK_DISCRETE ? engine->live.z
                      : bank == BANK_INPUT    ? engine->u
                                              : engine->p;
     if (values[index] == value)
         return;
+    engine_leave_segment(engine);
     values[index] = value;
     /* Guards that were reached by rounding were so in the state before. */
     if (bank == BANK_STATE)
@@ -135,6 +151,7 @@ void engine_set(Engine *engine, Bank bank, size_t index, double value)
 
 void engine_set_states(Engine *engine, const double *x)
 {
+    engine_leave_segment(engine);
     engine_copy(engine->live.x, x, engine->model->n_states);
     engine_clear_levels(engine, &engine->live);
     engine_changed(engine);

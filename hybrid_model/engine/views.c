@@ -23,6 +23,7 @@ bool engine_hold_view(Engine *engine, View view)
 {
     if (engine->view == view)
         return true;
+    engine_catch_up(engine);
     engine->view = VIEW_NONE;
     engine->has_outputs = engine->has_rates = engine->has_indicators = false;
     if (!show(engine, view))
@@ -85,8 +86,10 @@ const double *engine_values(Engine *engine, View view, Bank bank)
     if (bank == BANK_PARAMETER)
         return engine->p;
     /* What is as it is need not be copied to be shown. */
-    if (view == VIEW_LIVE && (bank == BANK_STATE || bank == BANK_DISCRETE))
+    if (view == VIEW_LIVE && (bank == BANK_STATE || bank == BANK_DISCRETE)) {
+        engine_catch_up(engine);
         return bank == BANK_STATE ? engine->live.x : engine->live.z;
+    }
     if (!engine_hold_view(engine, view))
         return NULL;
     switch (bank) {

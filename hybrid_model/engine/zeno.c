@@ -146,7 +146,7 @@ bool engine_zeno_record(Engine *engine, size_t jump)
     const ModelScales *scales = &engine->model->scales;
     const EngineOptions *options = &engine->options;
     JumpHistory *history = &engine->history[jump];
-    const char *name = NAME_AT(engine->model->names, engine->model->jumps[jump].name);
+    ModelName name = engine->model->jumps[jump].name;
     double t = *engine->live.time, gap = 0.0, ratio = 0.0;
     remember(engine, history, t);
     unsigned long long total = history->total, burst = history->burst;
@@ -164,13 +164,13 @@ bool engine_zeno_record(Engine *engine, size_t jump)
                 "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "
                 "ratio %.3f). Remedy: end the run before that time, or give the jump set a minimum dwell "
                 "time.",
-                total, name, t, t + rest, gap, ratio);
+                total, NAME_AT(engine->model->names, name), t, t + rest, gap, ratio);
     }
     if (crowded(engine, history, t))
         return engine_fail(
             engine, ENDED_ZENO,
             "Zeno: %llu jumps of '%s' in %.2g s around t = %.10g s. Remedy: end the run before that time, "
             "or give the jump set a minimum dwell time.",
-            burst, name, t - history->burst_start, t);
+            burst, NAME_AT(engine->model->names, name), t - history->burst_start, t);
     return true;
 }

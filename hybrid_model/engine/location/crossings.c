@@ -13,18 +13,19 @@
 
 /* By Chandrupatla's method: inverse quadratic interpolation where it is safe, bisection elsewhere.
    (T. R. Chandrupatla, Advances in Engineering Software 28, 1997.) */
-void engine_refine_bracket(Search *search, size_t row, Bracket *bracket)
+void engine_refine_bracket(Search *search, Path path, double wide, size_t row, Bracket *bracket)
 {
-    double a = bracket->a, fa = bracket->value_a, b = bracket->b, fb = bracket->value_b, fraction = 0.5;
+    double a = bracket->a, fa = bracket->value_a, b = bracket->b, fb = bracket->value_b, fraction = fa / (fa - fb);
     for (int i = 0; i < 200 && fb != 0.0 && !search->failed; i++) {
         /* Zero may lie between: the floats at the nearer end do not decide alone. */
-        double width = 2.0 * fmax(engine_time_ulp(a), engine_time_ulp(b));
+        double width = fmax(2.0 * fmax(engine_time_ulp(a), engine_time_ulp(b)), wide);
         if (b - a <= width)
             break;
-        double t = a + fraction * (b - a);
-        if (t <= a || t >= b)
+        double least = 0.5 * width / (b - a);
+        double t = a + fmin(fmax(fraction, least), 1.0 - least) * (b - a);
+        if (!(t > a && t < b))
             break;
-        double f = engine_look_at(search, ON_STEP, t, row);
+        double f = engine_look_at(search, path, t, row);
         /* newest, the opposite end, and the end that the newest replaces */
         double x1 = t, f1 = f, x2, f2, x3, f3;
         if (f >= 0.0) {
@@ -37,8 +38,6 @@ void engine_refine_bracket(Search *search, size_t row, Bracket *bracket)
         double xi = (x1 - x2) / (x3 - x2), phi = (f1 - f2) / (f3 - f2), part = 0.5;
         if (phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi)
             part = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2);
-        double least = 0.5 * width / (b - a);
-        part = fmin(fmax(part, least), 1.0 - least);
         fraction = f >= 0.0 ? 1.0 - part : part;
         if (!isfinite(fraction) || fraction <= 0.0 || fraction >= 1.0)
             fraction = 0.5;
@@ -73,6 +72,18 @@ static bool confirm(Search *search, size_t row, Bracket *bracket)
     return !search->failed;
 }
 
+/* Shrinks a bracket of the interpolation to the width at which a crossing is located on the solver's own step, where
+   each look costs a step: by far the most of them are spared.  False if the step has no rise there. */
+static bool locate_on_step(Search *search, size_t row, Bracket *bracket)
+{
+    const Step *step = &search->engine->step;
+    engine_refine_bracket(search, ON_INTERPOLATION, FIRST_STRIDE * (step->t1 - step->t0), row, bracket);
+    if (search->failed || !confirm(search, row, bracket))
+        return false;
+    engine_refine_bracket(search, ON_STEP, 0.0, row, bracket);
+    return !search->failed;
+}
+
 /* The first crossing of one row that begins before `latest`. */
 static bool first_crossing(Search *search, size_t row, double latest, double *t)
 {
@@ -80,10 +91,9 @@ static bool first_crossing(Search *search, size_t row, double latest, double *t)
     Bracket bracket;
     engine_begin_rises(&rises, search, row, 0.0);
     while (engine_next_rise(&rises, latest, &bracket))
-        if (confirm(search, row, &bracket)) {
-            engine_refine_bracket(search, row, &bracket);
+        if (locate_on_step(search, row, &bracket)) {
             *t = bracket.b;
-            return !search->failed;
+            return true;
         }
     return false;
 }
@@ -105,12 +115,10 @@ bool engine_first_guard(Search *search, double *t)
 static bool exit_beyond(Search *search, double beyond, Bracket bracket, double *t)
 {
     search->level -= beyond;
-    bool found = confirm(search, search->exit_row, &bracket);
-    if (found)
-        engine_refine_bracket(search, search->exit_row, &bracket);
+    bool found = locate_on_step(search, search->exit_row, &bracket);
     search->level += beyond;
     *t = bracket.b;
-    return found && !search->failed;
+    return found;
 }
 
 double engine_last_inside(Search *search, double t)
@@ -122,19 +130,24 @@ double engine_last_inside(Search *search, double t)
         bracket = next;
     if (search->failed || !isfinite(bracket.b))
         return -INFINITY;
-    if (!confirm(search, search->exit_row, &bracket))
-        return (double)NAN;
-    engine_refine_bracket(search, search->exit_row, &bracket);
-    return bracket.b;
+    return locate_on_step(search, search->exit_row, &bracket) ? bracket.b : (double)NAN;
 }
 
-bool engine_first_exit(Search *search, double *t)
+/* Whether the rise in the bracket comes after `latest`. */
+static bool rises_later(Search *search, const Bracket *bracket, double latest)
+{
+    return bracket->a >= latest ||
+           (bracket->b > latest && engine_look_at(search, ON_STEP, latest, search->exit_row) < 0.0);
+}
+
+bool engine_first_exit(Search *search, double latest, double *t)
 {
     const Step *step = &search->engine->step;
     Rises rises;
     Bracket far;
     engine_begin_rises(&rises, search, search->exit_row, 0.0);
-    if (engine_sample(search, 0, search->exit_row) <= 0.0 && !engine_next_rise(&rises, INFINITY, &far))
+    if (engine_sample(search, 0, search->exit_row) <= 0.0 &&
+        (!engine_next_rise(&rises, latest, &far) || rises_later(search, &far, latest)))
         return false;
     double border = engine_flow_border(search->engine, search->point, step->t1, step->x1);
     double beyond = search->level < -border ? border : border + search->level;

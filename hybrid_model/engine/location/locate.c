@@ -32,7 +32,7 @@ static double crossing_soon_after(Search *search, double from, bool want_first)
         if (!engine->is_guard[row] || now[row] >= 0.0 || then[row] < 0.0)
             continue;
         Bracket bracket = {from, now[row], until, then[row]};
-        engine_refine_bracket(search, row, &bracket);
+        engine_refine_bracket(search, ON_STEP, 0.0, row, &bracket);
         if (chosen == from || (want_first ? bracket.b < chosen : bracket.b > chosen))
             chosen = bracket.b;
     }
@@ -43,6 +43,8 @@ static double crossing_soon_after(Search *search, double from, bool want_first)
 static double common_time(Search *search, double first)
 {
     Engine *engine = search->engine;
+    if (engine->n_guards < 2)
+        return first;
     double latest = crossing_soon_after(search, first, false);
     double *now = engine->samples, *then = engine->samples + search->n_rows;
     if (latest == first || search->failed || !engine_look(search, ON_STEP, first, now) ||
@@ -62,7 +64,9 @@ static FlowEnd move_to(Search *search, double t)
         (point == &engine->live && !engine_record_step(engine, t, engine->probe_x)))
         return FLOW_PROBLEM;
     *point->time = t;
-    *point->step = 0.0;
+    engine_begin_anew(engine, point);
+    /* Events often come at equal intervals, or at shorter and shorter ones. */
+    engine->status->stride = fmin(engine->status->stride, t - engine->status->jumps_time);
     for (size_t i = 0; i < engine->model->n_states; i++)
         point->x[i] = engine->probe_x[i];
     engine_note_sizes(engine, point);
@@ -254,7 +258,9 @@ FlowEnd engine_locate_event(Engine *engine, const Point *point, double level, do
         return FLOW_PROBLEM;
     double guard = INFINITY, leaving = INFINITY; /* lines 16 and 17 */
     bool has_guard = engine_first_guard(&search, &guard);
-    bool leaves = m->has_flow_set && !search.failed && engine_first_exit(&search, &leaving);
+    /* An exit within one instant before a guard, or after it, gives way. */
+    double latest = has_guard ? guard - engine_one_instant(engine, guard) : (double)INFINITY;
+    bool leaves = m->has_flow_set && !search.failed && engine_first_exit(&search, latest, &leaving);
     if (search.failed)
         return FLOW_PROBLEM;
     if (has_guard && (!leaves || guard <= leaving + engine_one_instant(engine, leaving))) {

@@ -2,9 +2,9 @@
 
    A piece of the step is sampled at Chebyshev points.  The polynomial through the samples has
    Bernstein coefficients that enclose it, and Chebyshev coefficients whose tail tells how well it
-   represents the margin.  Both together exclude a rise, or show that the margin is monotone so that
-   the ends of the piece decide, or the piece is halved and its first half looked at first.  The
-   decisions are those of hybrid_model/reference/zero_crossings.py. */
+   represents the margin.  Both together exclude a rise, or show that the margin is monotone or bent one
+   way so that the ends of the piece decide, or the piece is split and its first part looked at first.
+   hybrid_model/reference/zero_crossings.py finds the same, with halvings. */
 #include <math.h>
 
 #include "search.h"
@@ -49,6 +49,12 @@ static const double CONTRIBUTION[N_SAMPLES][N_SAMPLES + 2] = {
 
 /* Above the sum of the weights' sizes in any Bernstein coefficient, 164, and in both of the tail, 10. */
 #define BEND_FACTOR 200.0
+/* So many tails in a difference of the coefficients, and in a difference of differences, may be error. */
+#define SLOPE_TAILS DEGREE
+#define CURVE_TAILS 96.0
+/* Four times (2 * 164 + 10 SLOPE_TAILS), and 28 times (4 * 164 + 10 CURVE_TAILS), and more. */
+#define BEND_IN_SLOPE 2000.0
+#define BEND_IN_CURVE 50000.0
 
 /* What samples tell: whether they settle where the first rise of the piece is, and the samples around
    it.  Without a rise both indices are equal. */
@@ -78,47 +84,110 @@ static bool all_finite(const double *samples)
     return i == N_SAMPLES;
 }
 
-/* A quick exclusion, which implies that of judge: most margins are nearly straight and far below zero.
-   The Bernstein coefficients of a straight line lie between its ends, and what bends away from the line
-   changes them and the tail by less than BEND_FACTOR times the largest deviation of a sample. */
-static bool far_below(const double *samples)
+/* What is known of the shape of a margin between its ends. */
+typedef struct {
+    bool below, above, rising, falling, convex, concave;
+} Shape;
+
+/* A margin that is monotone, convex from below zero or to below it, or concave from above or to above, rises once or
+   never: its ends decide. */
+static bool ends_decide(const Shape *shape, const double *samples, Verdict *verdict)
 {
-    double a = samples[0], b = samples[DEGREE], bend = 0.0;
-    for (size_t i = 1; i < DEGREE; i++) {
-        double deviation = fabs(samples[i] - (a + (b - a) * POINTS[i]));
-        bend = deviation > bend ? deviation : bend;
-    }
-    return (a > b ? a : b) + BEND_FACTOR * bend < 0.0;
+    bool begins_below = samples[0] < 0.0, ends_below = samples[DEGREE] < 0.0;
+    bool never = shape->below || shape->above;
+    *verdict = (Verdict){true, 0, !never && begins_below && !ends_below ? DEGREE : 0};
+    return never || shape->rising || shape->falling || (shape->convex && (begins_below || ends_below)) ||
+           (shape->concave && !(begins_below && ends_below));
 }
 
-static Verdict judge(const double *samples)
+/* The shape of most margins, those that are nearly a parabola, quickly: `polynomial` would find the same.  A parabola has
+   three Bernstein coefficients, and its coefficients of degree eight lie between them, with differences of at least a
+   quarter of theirs and differences of those of a 28th of theirs.  What bends away from it changes them and the tail
+   by less than the largest deviation of a sample times the factors above. */
+static Shape parabola(const double *samples)
+{
+    double a = samples[0], b = samples[DEGREE], middle = 2.0 * samples[DEGREE / 2] - 0.5 * (a + b), bend = 0.0;
+    double first = middle - a, second = b - middle;
+    for (size_t i = 1; i < DEGREE; i++) {
+        double deviation = fabs(samples[i] - (a + POINTS[i] * (2.0 * first + POINTS[i] * (second - first))));
+        bend = deviation > bend ? deviation : bend;
+    }
+    double least = a < b ? a : b, most = a > b ? a : b, slope = BEND_IN_SLOPE * bend, curve = BEND_IN_CURVE * bend;
+    return (Shape){.below = (middle > most ? middle : most) + BEND_FACTOR * bend < 0.0,
+                   .above = (middle < least ? middle : least) - BEND_FACTOR * bend >= 0.0,
+                   .rising = first > slope && second > slope,
+                   .falling = first < -slope && second < -slope,
+                   .convex = second - first > curve,
+                   .concave = second - first < -curve};
+}
+
+static Shape polynomial(const double *samples)
 {
     double bounds[N_SAMPLES + 2] = {0.0};
-    bool below = true, above = true, rising = true, falling = true;
-    if (!all_finite(samples))
-        return between_samples(true, samples);
-    if (far_below(samples))
-        return (Verdict){true, 0, 0};
+    Shape shape = {true, true, true, true, true, true};
     for (size_t k = 0; k < N_SAMPLES; k++)
         for (size_t i = 0; i < N_SAMPLES + 2; i++)
             bounds[i] += CONTRIBUTION[k][i] * samples[k];
     double tail = fabs(bounds[N_SAMPLES]) + fabs(bounds[N_SAMPLES + 1]);
     for (size_t i = 0; i < N_SAMPLES; i++) {
-        below = below && bounds[i] + tail < 0.0;
-        above = above && bounds[i] - tail >= 0.0;
+        shape.below = shape.below && bounds[i] + tail < 0.0;
+        shape.above = shape.above && bounds[i] - tail >= 0.0;
     }
-    if (below || above)
-        return (Verdict){true, 0, 0};
-    /* The derivative of the polynomial is off by up to the degree squared times the tail, its
-       coefficients are the differences times the degree. */
+    /* The derivative of the polynomial is off by up to the degree squared times the tail, its coefficients are the
+       differences times the degree; and so on. */
     for (size_t i = 0; i < DEGREE; i++) {
-        double difference = bounds[i + 1] - bounds[i];
-        rising = rising && difference > DEGREE * tail;
-        falling = falling && difference < -DEGREE * tail;
+        double slope = bounds[i + 1] - bounds[i];
+        shape.rising = shape.rising && slope > SLOPE_TAILS * tail;
+        shape.falling = shape.falling && slope < -SLOPE_TAILS * tail;
     }
-    if (rising || falling)
-        return (Verdict){true, 0, samples[0] < 0.0 && samples[DEGREE] >= 0.0 ? DEGREE : 0};
-    return between_samples(false, samples);
+    for (size_t i = 1; i < DEGREE; i++) {
+        double curve = bounds[i + 1] - 2.0 * bounds[i] + bounds[i - 1];
+        shape.convex = shape.convex && curve > CURVE_TAILS * tail;
+        shape.concave = shape.concave && curve < -CURVE_TAILS * tail;
+    }
+    return shape;
+}
+
+static Verdict judge(const double *samples)
+{
+    Verdict verdict;
+    if (!all_finite(samples))
+        return between_samples(true, samples);
+    Shape shape = parabola(samples);
+    if (ends_decide(&shape, samples, &verdict))
+        return verdict;
+    shape = polynomial(samples);
+    return ends_decide(&shape, samples, &verdict) ? verdict : between_samples(false, samples);
+}
+
+/* Where a piece that is not settled is split, as a part of it: where it has a kink, if it has one, so that what is left
+   of the kink lies at an end and weighs little.  That is where the parabolas through neighbouring samples on both sides
+   meet, at the place where the lines through them differ most in slope. */
+static double split_point(const double *samples)
+{
+    double slopes[DEGREE], most = 0.0, at = 0.5;
+    size_t gap = 0;
+    for (size_t i = 0; i < DEGREE; i++)
+        slopes[i] = (samples[i + 1] - samples[i]) / (POINTS[i + 1] - POINTS[i]);
+    for (size_t i = 2; i + 2 < DEGREE; i++) {
+        double turn = fabs(slopes[i + 1] - slopes[i - 1]);
+        gap = turn > most ? i : gap;
+        most = turn > most ? turn : most;
+    }
+    if (gap == 0)
+        return at;
+    const double *x = POINTS + gap;
+    double left_bend = (slopes[gap - 1] - slopes[gap - 2]) / (x[0] - x[-2]);
+    double right_bend = (slopes[gap + 2] - slopes[gap + 1]) / (x[3] - x[1]);
+    double left = slopes[gap - 1] + (x[0] - x[-1]) * left_bend, right = slopes[gap + 1] - (x[2] - x[1]) * right_bend;
+    at = 0.5 * (x[0] + x[1]);
+    for (int i = 0; i < 2; i++) {
+        double a = at - x[0], b = at - x[1];
+        double apart = samples[gap] + a * (left + a * left_bend) - (samples[gap + 1] + b * (right + b * right_bend));
+        at -= apart / (left + 2.0 * a * left_bend - (right + 2.0 * b * right_bend));
+        at = fmin(fmax(at, x[0]), x[1]);
+    }
+    return at;
 }
 
 void engine_begin_rises(Rises *rises, Search *search, size_t row, double threshold)
@@ -131,7 +200,7 @@ void engine_begin_rises(Rises *rises, Search *search, size_t row, double thresho
     rises->value = engine_sample(search, 0, row) - threshold;
     rises->ends[0] = step->t1;
     rises->n_ends = 1;
-    rises->halvings = 0;
+    rises->splits = 0;
 }
 
 /* The row at the points of the piece from rises->begin to `end`. */
@@ -159,9 +228,9 @@ bool engine_next_rise(Rises *rises, double latest, Bracket *bracket)
             return false;
         Verdict verdict = judge(samples);
         double shortest = DEGREE * DEGREE * fmax(engine_time_ulp(begin), engine_time_ulp(end));
-        if (!verdict.settled && rises->halvings < HALVINGS && end - begin > shortest) {
-            rises->halvings++;
-            rises->ends[rises->n_ends++] = 0.5 * (begin + end);
+        if (!verdict.settled && rises->splits < SPLITS && end - begin > shortest) {
+            double part = rises->splits++ % 4 < 3 ? split_point(samples) : 0.5;
+            rises->ends[rises->n_ends++] = begin + part * (end - begin);
             continue;
         }
         rises->n_ends--;

@@ -18,10 +18,10 @@ static bool states_are_finite(Engine *engine, double t, const double *x)
     return true;
 }
 
-bool engine_look(Search *search, Path path, double t, double *rows)
+/* The states at a time of the step; NULL, and the search has failed, if they cannot be had. */
+static const double *states_at(Search *search, Path path, double t)
 {
     Engine *engine = search->engine;
-    const Model *m = engine->model;
     const Step *step = &engine->step;
     const double *x = path == ON_STEP ? engine->probe_x : engine->dense_x;
     /* Both paths begin and end where the step does. */
@@ -30,20 +30,36 @@ bool engine_look(Search *search, Path path, double t, double *rows)
     else if (path == ON_INTERPOLATION)
         engine_step_dense(engine, t);
     else if (!engine_step_probe(engine, search->point, t))
+        x = NULL;
+    if (x && states_are_finite(engine, t, x))
+        return x;
+    search->failed = true;
+    return NULL;
+}
+
+/* By how much the state is outside the flow set. */
+static bool look_outside(Search *search, double t, const double *x, double *outside)
+{
+    double margin;
+    if (!engine_evaluate_flow_set(search->engine, t, x, search->point->z, &margin))
         return !(search->failed = true);
-    if (!states_are_finite(engine, t, x) || !engine_evaluate_margins(engine, t, x, search->point->z))
-        return !(search->failed = true);
-    for (size_t i = 0; i < m->n_margins; i++)
-        rows[i] = engine->margins[i];
-    if (m->has_flow_set) {
-        double margin;
-        if (!engine_evaluate_flow_set(engine, t, x, search->point->z, &margin))
-            return !(search->failed = true);
-        /* Zero is inside the flow set, so it is not yet an exit. */
-        double outside = search->level - margin;
-        rows[search->exit_row] = outside == 0.0 ? -DBL_MIN : outside;
-    }
+    *outside = search->level - margin;
+    /* Zero is inside the flow set, so it is not yet an exit. */
+    if (*outside == 0.0)
+        *outside = -DBL_MIN;
     return true;
+}
+
+bool engine_look(Search *search, Path path, double t, double *rows)
+{
+    Engine *engine = search->engine;
+    const double *x = states_at(search, path, t);
+    if (!x)
+        return false;
+    if (!engine_evaluate_margins(engine, t, x, search->point->z))
+        return !(search->failed = true);
+    engine_copy(rows, engine->margins, engine->model->n_margins);
+    return !engine->model->has_flow_set || look_outside(search, t, x, &rows[search->exit_row]);
 }
 
 bool engine_try_to_look(Search *search, Path path, double t, double *rows)
@@ -55,8 +71,17 @@ bool engine_try_to_look(Search *search, Path path, double t, double *rows)
 
 double engine_look_at(Search *search, Path path, double t, size_t row)
 {
-    double *rows = search->engine->samples + N_SAMPLES * search->n_rows;
-    return engine_look(search, path, t, rows) ? rows[row] : 0.0;
+    Engine *engine = search->engine;
+    double outside = 0.0;
+    const double *x = states_at(search, path, t);
+    if (!x)
+        return 0.0;
+    if (row == search->exit_row)
+        return look_outside(search, t, x, &outside) ? outside : 0.0;
+    if (engine_evaluate_margins(engine, t, x, search->point->z))
+        return engine->margins[row];
+    search->failed = true;
+    return 0.0;
 }
 
 double engine_sample(const Search *search, size_t i, size_t row)

@@ -10,8 +10,8 @@
 #endif
 
 #define DEGREE (N_SAMPLES - 1)
-/* How often one row is halved in one step: a simple crossing needs none, a kink some ten. */
-#define HALVINGS 60
+/* How often one row is split in one step: a simple crossing needs none, a kink a few. */
+#define SPLITS 60
 
 /* Rows are the jumps' margins, then the exit from the flow set. */
 typedef struct {
@@ -37,9 +37,9 @@ typedef struct {
     size_t row;
     double threshold;
     double begin, value;      /* the start of the next piece, and the row there less the threshold */
-    double ends[HALVINGS + 1];
+    double ends[SPLITS + 1];
     size_t n_ends;
-    int halvings;
+    int splits;
 } Rises;
 
 /* samples.c */
@@ -63,14 +63,14 @@ bool engine_next_rise(Rises *rises, double latest, Bracket *bracket);
 
 /* crossings.c */
 /* Shrinks a bracket on the solver's step to the width at which a crossing is located. */
-void engine_refine_bracket(Search *search, size_t row, Bracket *bracket);
+void engine_refine_bracket(Search *search, Path path, double wide, size_t row, Bracket *bracket);
 /* The first guard crossing on the step; with flow priority guards are not looked at inside the flow set. */
 bool engine_first_guard(Search *search, double *t);
 /* The last time before `t` at which the flow set's margin falls below zero: minus infinity if the interpolation has
    none, not a number if the step has none. */
 double engine_last_inside(Search *search, double t);
 /* The time at which the flow set is left, if the step leaves it by more than the tolerance. */
-bool engine_first_exit(Search *search, double *t);
+bool engine_first_exit(Search *search, double latest, double *t);
 
 #if defined(__GNUC__)
 #pragma GCC visibility pop
