@@ -30,9 +30,9 @@ from hybrid_model.native.build.objects import COMMON_FLAGS, STRICT_FLAGS
 
 HERE = Path(__file__).parent
 HEIGHT, GRAVITY, RESTITUTION = 1.0, 9.81, 0.7
-STEP, STEPS = 0.01, 200
-FLIGHT = 40
-"""Steps before the first impact, which comes in step 46."""
+STEP, STOP = 0.01, 2.0
+FLIGHT = 0.4
+"""A time in s before the first impact, which comes at 0.45 s."""
 TIME_LIMIT = 600
 READ = ("h", "v")
 EULER = "forward Euler in C, stand-in"
@@ -185,9 +185,10 @@ def python_library():
     return ctypes.util.find_library(f"python{sys.version_info.major}.{sys.version_info.minor}")
 
 
-def run(program, balls, *, rounds, steps=STEPS, flight=FLIGHT):
+def run(program, balls, *, rounds, step=STEP, stop=STOP):
     """What the driver measures, by contender."""
-    command = [str(program), "--step", str(STEP), "--steps", str(steps), "--flight", str(min(flight, steps))]
+    steps, flight = (round(t / step) for t in (stop, min(FLIGHT, stop)))
+    command = [str(program), "--step", str(step), "--steps", str(steps), "--flight", str(flight)]
     command += ["--rounds", str(rounds)]
     environment = dict(os.environ)
     if any(ball.embeds for ball in balls):
@@ -300,11 +301,15 @@ def main():
     parser = argparse.ArgumentParser(prog="python -m benchmarks.step_cost", description=__doc__)
     parser.add_argument("--rounds", type=int, default=200, help="timed runs of each contender (default %(default)s)")
     parser.add_argument("--reference", type=Path, help="BouncingBall.fmu of the FMI Reference FMUs, if it is at hand")
+    parser.add_argument("--step", type=float, default=STEP, help="communication step in s (default %(default)s)")
+    parser.add_argument("--stop", type=float, default=STOP, help="end of each run in s (default %(default)s)")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         program = compile_driver(folder)
         balls = contenders(folder, options.reference)
-        runs = [run(program, group, rounds=options.rounds) for group in groups(balls)]
+        runs = [
+            run(program, group, rounds=options.rounds, step=options.step, stop=options.stop) for group in groups(balls)
+        ]
     print(f"{steps_table(runs)}\n\n{calls_table(runs)}")
 
 

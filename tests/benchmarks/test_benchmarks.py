@@ -92,8 +92,8 @@ def test_every_contender_finds_the_events_of_a_short_run(contender, problem):
     assert entry.score.state_error < 1e-4  # event times of 1e-6 s, speeds up to 5 m/s
 
 
-def run_driver(tmp_path, *balls, steps=60):
-    return step_cost.run(step_cost.compile_driver(tmp_path), balls, rounds=2, steps=steps)
+def run_driver(tmp_path, *balls, stop=0.6):
+    return step_cost.run(step_cost.compile_driver(tmp_path), balls, rounds=2, stop=stop)
 
 
 def test_the_c_driver_runs_fmus_past_an_impact_and_times_every_call(tmp_path, exported):
@@ -123,7 +123,7 @@ def test_the_c_driver_says_what_a_contender_refuses(tmp_path, exported):
         run_driver(tmp_path, replace(own, token="another"))
     # Past its Zeno time, 2.5586 s, the ball ends its run.
     with pytest.raises(step_cost.DriverError, match="Zeno"):
-        run_driver(tmp_path, own, steps=260)
+        run_driver(tmp_path, own, stop=2.6)
 
 
 @pytest.mark.long
