@@ -23,8 +23,10 @@
 #define LOOK_AHEAD_TIMES 1e6
 #define LOOK_AHEAD_EVENTS 1e3
 #define INSTANT_STEPS 1000
-/* A look ahead of one step of the solver goes no further than so many steps of the importer. */
+/* A look ahead of one step of the solver goes no further than so many steps of the importer, and pays where the target
+   is no more than so many steps of the solver away. */
 #define STEPS_AHEAD 1000.0
+#define STEPS_BELOW 100.0
 /* A step that communication points are read from is that much shorter than its error allows: the error of the
    interpolation is some ten times as great, and falls with the fifth power. */
 #define SEGMENT_PART 0.35

@@ -161,12 +161,19 @@ static bool target_is_quiet(Engine *engine, EventPolicy policy)
     }
 }
 
+static bool target_is_near(const Engine *engine)
+{
+    double step = *engine->live.step;
+    return !(step > 0.0) || engine->target - *engine->live.time <= STEPS_BELOW * step;
+}
+
 FlowEnd engine_flow_on(Engine *engine, EventPolicy policy, bool ahead, size_t *budget, bool *foreseen)
 {
     Status *status = engine->status;
     const Point *live = &engine->live;
     for (; *budget > 0; --*budget) {
-        if (status->prediction == PREDICTION_NONE && !(ahead && look_one_step_ahead(engine)))
+        if (status->prediction == PREDICTION_NONE &&
+            !(ahead && target_is_near(engine) && look_one_step_ahead(engine)))
             break;
         if (target_is_quiet(engine, policy)) {
             /* A hook wants to see each step, so none may go beyond the target. */
