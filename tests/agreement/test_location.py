@@ -14,7 +14,7 @@ from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
 from fmu.build.binaries import own_files
-from hybrid_model.reference.zero_crossings import HALVINGS, POINTS, TO_BERNSTEIN, TO_TAIL
+from hybrid_model.reference.zero_crossings import DEGREE, HALVINGS, POINTS, TO_BERNSTEIN, TO_TAIL
 
 EXECUTIONS = pytest.mark.parametrize("execution", ["python", "in process", "fmu"])
 BELOW = 1e-12
@@ -220,8 +220,14 @@ def test_the_tables_of_the_runtime_are_those_of_python():
     np.testing.assert_allclose(table("POINTS", 1)[:, 0], POINTS, rtol=0, atol=1e-15)
     np.testing.assert_allclose(contribution[:, :-2].T, TO_BERNSTEIN, rtol=0, atol=1e-12)
     np.testing.assert_allclose(contribution[:, -2:].T, TO_TAIL, rtol=0, atol=1e-15)
-    assert int(re.search(r"HALVINGS (\d+)", own_files("search.h")[0].read_text())[1]) == HALVINGS
-    # The quick exclusion rests on this bound of what samples between the ends contribute.
-    factor = float(re.search(r"BEND_FACTOR (\S+)", text)[1])
+    assert int(re.search(r"SPLITS (\d+)", own_files("search.h")[0].read_text())[1]) == HALVINGS
+    # The quick verdicts rest on these bounds of what samples between the ends contribute.
     weights = np.abs(contribution[1:-1])
-    assert weights[:, :-2].sum(axis=0).max() + weights[:, -2:].sum() < factor
+    bound, tail = weights[:, :-2].sum(axis=0).max(), weights[:, -2:].sum()
+
+    def factor(name):
+        return float(re.search(rf"#define {name} (\S+)", text)[1])
+
+    assert bound + tail < factor("BEND_FACTOR")
+    assert 4.0 * (2.0 * bound + DEGREE * tail) < factor("BEND_IN_SLOPE")
+    assert 28.0 * (4.0 * bound + factor("CURVE_TAILS") * tail) < factor("BEND_IN_CURVE")
