@@ -11,7 +11,7 @@ from cosim.errors import CosimError, MisfitError
 from cosim.slave import Port, Slave
 from fmu.importer.values import Value
 from hybrid_model import Automaton, Execution, Solver, ZenoGuard
-from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.layout import Layout, layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import Kind, element_names
 from hybrid_model.errors import SchedulingError
@@ -36,7 +36,7 @@ class AutomatonSlave(Slave):
     can_restore = True
 
     def __init__(self, name: str, automaton: Automaton, solver: Solver | None = None) -> None:
-        layout = Layout(automaton)
+        layout = layout_of(automaton)
         ports: dict[Kind, list[Port]] = {kind: [] for kind in Kind}
         for variable in automaton.variables:
             discrete = variable.discrete or variable.kind is Kind.DISCRETE

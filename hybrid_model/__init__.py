@@ -25,10 +25,10 @@ from hybrid_model.record.arc import HybridArc, load_arc
 from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.samples import Samples
 from hybrid_model.reference.execution import Execution
-from hybrid_model.reference.zeno import ZenoGuard
 from hybrid_model.simulate import simulate
 from hybrid_model.solver import Method, Solver
 from hybrid_model.stop import Stop
+from hybrid_model.zeno_guard import ZenoGuard
 
 if TYPE_CHECKING:
     from hybrid_model.schedule.event_network import NetworkRun, simulate_network

@@ -1,24 +1,31 @@
-"""Run an automaton: alternate jumps and flows until the end time or until it cannot go on."""
+"""Run an automaton on the engine in C, or on the reference in Python where that one cannot run it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 from hybrid_model.declare.arguments import real_number, require_automaton, require_inputs, require_options
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.calls import explained
-from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.layout import layout_of
+from hybrid_model.declare.real_numbers import told
 from hybrid_model.declare.signals import Inputs, InputValue
-from hybrid_model.errors import SimulationError
+from hybrid_model.errors import BuildError, SimulationError, TraceError
 from hybrid_model.record.arc import HybridArc
 from hybrid_model.record.arc_values import ComputedValues
+from hybrid_model.record.flow_piece import unseen
 from hybrid_model.record.recording import Recording
 from hybrid_model.record.run_record import RunRecord
 from hybrid_model.reference.execution import Execution
-from hybrid_model.reference.zeno import ZenoGuard
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
+from hybrid_model.zeno_guard import ZenoGuard
+
+_SOLVER, _ZENO = Solver(), ZenoGuard()
+ENGINES = ("auto", "native", "python")
+RECORDS = ("all", "events")
 
 
 @explained(solver=Solver, zeno=ZenoGuard)
@@ -30,6 +37,8 @@ def simulate(
     inputs: Mapping[str, InputValue] | None = None,
     solver: Solver | None = None,
     zeno: ZenoGuard | None = None,
+    engine: str = "auto",
+    record: str = "all",
 ) -> HybridArc:
     """Run an automaton from its start values.
 
@@ -51,6 +60,12 @@ def simulate(
         Method and accuracy.
     zeno : ZenoGuard, optional
         What counts as an accumulation of jumps.
+    engine : {"auto", "native", "python"}
+        The engine in C, which runs maps that are compiled, or the readable one in Python, which runs any. Default: the
+        native one wherever it can; `HybridArc.engine` says which ran and why.
+    record : {"all", "events"}
+        What is kept: every step with its dense output, some ``8 * (3 + 6 * states)`` bytes each, or the jumps alone;
+        then the states between two jumps are not in the result.
 
     Returns
     -------
@@ -60,7 +75,8 @@ def simulate(
     Raises
     ------
     SimulationError
-        For times that are not finite or reversed, for options of another type, and for values that do not stay finite.
+        For times that are not finite or reversed, for options of another type, for values that do not stay finite, and
+        if ``engine="native"`` cannot run the automaton.
     DeclarationError
         If `automaton` is no instance of an automaton, or an input is unknown or has the wrong shape.
     """
@@ -68,15 +84,59 @@ def simulate(
     require_inputs(inputs)
     require_options("solver", solver, Solver, first="method")
     require_options("zeno", zeno, ZenoGuard, first="max_jumps")
+    _require_choice("engine", engine, ENGINES)
+    _require_choice("record", record, RECORDS)
     t_start, t_end = real_number("t_start", t_start), real_number("t_end", t_end)
     if not (math.isfinite(t_end) and t_end >= t_start):
         raise SimulationError(
             f"the end time is {t_end} s and the start {t_start} s: give a finite end after the start."
         )
-    execution = Execution(
-        automaton, t_start=t_start, t_stop=t_end, inputs=Inputs(Layout(automaton), inputs), solver=solver, zeno=zeno
-    )
-    recording = Recording(execution.t, execution.j, execution.x, execution.z, execution.inputs.held)
+    if not math.isfinite(t_start):
+        raise SimulationError(f"the start time of {automaton.name} is {t_start}: give a finite number.")
+    given = Inputs(layout_of(automaton), inputs)
+    solver, zeno = solver or _SOLVER, zeno or _ZENO
+    why = 'python: it was asked for (engine="python").'
+    if engine != "python":
+        try:
+            return HybridArc(_native_run(automaton, given, (t_start, t_end), solver, zeno, record))
+        except (TraceError, BuildError) as error:
+            why = f"python: {error}"
+            if engine == "native":
+                raise SimulationError(f"{automaton.name} cannot run on the native engine: {error}") from error
+    return HybridArc(replace(_reference_run(automaton, given, (t_start, t_end), solver, zeno, record), engine=why))
+
+
+def _native_run(
+    automaton: Automaton,
+    inputs: Inputs,
+    span: tuple[float, float],
+    solver: Solver,
+    zeno: ZenoGuard,
+    record: str,
+) -> RunRecord:
+    # CasADi is imported by whoever runs something, and not by all who import the package.
+    from hybrid_model.native.simulation import native_run
+
+    def check() -> None:
+        """Call the maps with numbers: slips in them are told as the author wrote them, not as they are traced."""
+        start = Execution(automaton, t_start=span[0], t_stop=span[1], inputs=inputs, solver=solver, zeno=zeno)
+        if start.x.size and start.due() is None and start.in_flow_set() and span[1] > span[0]:
+            start.rates_at(start.t, start.x)
+
+    return native_run(automaton, inputs, span, solver, zeno, events_only=record == "events", check=check)
+
+
+def _reference_run(
+    automaton: Automaton,
+    inputs: Inputs,
+    span: tuple[float, float],
+    solver: Solver,
+    zeno: ZenoGuard,
+    record: str,
+) -> RunRecord:
+    t_end = span[1]
+    execution = Execution(automaton, t_start=span[0], t_stop=t_end, inputs=inputs, solver=solver, zeno=zeno)
+    recording = Recording(execution.t, execution.j, execution.x, execution.z, inputs.held)
     # Lines 2 to 5 of the algorithm in docs/semantics.md.
     while execution.stopped is None:
         index = execution.due()
@@ -85,7 +145,13 @@ def simulate(
         elif execution.t >= t_end and execution.in_flow_set():
             execution.stop(Stop.HORIZON, f"reached t = {t_end:.9g} s.")
         else:
-            recording.flowed(execution.flow(t_end))
+            pieces = execution.flow(t_end)
+            recording.flowed(pieces if record == "all" else unseen(pieces))
     read = ComputedValues(automaton, execution.inputs)
     stop, message = execution.stopped, execution.message
-    return HybridArc(RunRecord(read, recording.flows, recording.jumps, stop, message, execution.event_tolerance))
+    return RunRecord(read, recording.flows, recording.jumps, stop, message, execution.event_tolerance)
+
+
+def _require_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
+    if given not in choices:
+        raise SimulationError(f"{name} = {told(given)}: give one of {', '.join(map(repr, choices))}.")

@@ -15,7 +15,6 @@ from hybrid_model.consensus.certificates.forms import Certified, Quantity
 from hybrid_model.consensus.figures.conservatism import save_certificate_figures
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import load_scenario
-from hybrid_model.native.compiled import compiled
 
 SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-audit.md of this project"
 """What the short names in the sources of values mean."""
@@ -52,7 +51,7 @@ def run(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario)
     progress("running the closed loop")
     zeno = hm.ZenoGuard(max_jumps=options.max_jumps)
-    arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time, zeno=zeno)
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=zeno)
     progress("computing the bounds")
     found = certify(scenario, arc)
     document = json.dumps(_document(found, details=options.details), indent=2)

@@ -37,14 +37,24 @@ def explained(
         @functools.wraps(function)
         def call(*given: P.args, **named: P.kwargs) -> R:
             try:
-                signature.bind(*given, **named)
+                return function(*given, **named)
             except TypeError as error:
+                # A run costs less than binding its arguments does, so that is done where something is wrong alone.
+                if _fits(signature, given, named):
+                    raise
                 raise error_class(_sentence(function.__name__, signature, options, given, named)) from error
-            return function(*given, **named)
 
         return call
 
     return decorate
+
+
+def _fits(signature: inspect.Signature, given: tuple[Any, ...], named: Mapping[str, Any]) -> bool:
+    try:
+        signature.bind(*given, **named)
+    except TypeError:
+        return False
+    return True
 
 
 def _sentence(

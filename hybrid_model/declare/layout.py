@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -149,6 +150,19 @@ class Layout:
         ]
         shown = ", ".join(pairs[:12])
         return shown + (f", and {len(pairs) - 12} more" if len(pairs) > 12 else "")
+
+
+_layouts: weakref.WeakKeyDictionary[Declares, tuple[object, str, Layout]] = weakref.WeakKeyDictionary()
+
+
+def layout_of(automaton: Declares) -> Layout:
+    """Return the layout of an automaton, which is made once for all its runs."""
+    known = _layouts.get(automaton)
+    if known is not None and known[0] is automaton.variables and known[1] == automaton.name:
+        return known[2]
+    layout = Layout(automaton)
+    _layouts[automaton] = (automaton.variables, automaton.name, layout)
+    return layout
 
 
 def _remedy(variable: Variable) -> str:

@@ -56,6 +56,11 @@ class Inputs:
         parameter is given like a discrete input: it takes the value of its `Signal` at the start and at each
         breakpoint, and holds it in between.
 
+    Attributes
+    ----------
+    layout : Layout
+        The same.
+
     Raises
     ------
     DeclarationError
@@ -63,9 +68,9 @@ class Inputs:
     """
 
     def __init__(self, layout: Layout, given: Mapping[str, InputValue] | None = None) -> None:
-        self._layout = layout
+        self.layout = layout
         self._held = layout.start(Kind.INPUT)
-        self._signals: list[tuple[Place, Callable[[float], npt.ArrayLike]]] = []
+        self._signals: list[tuple[Place, Callable[[float], npt.ArrayLike], tuple[float, ...]]] = []
         self._parameters = layout.start(Kind.PARAMETER)
         self._tuned: list[tuple[Place, Steps]] = []
         breakpoints: list[float] = []
@@ -77,8 +82,9 @@ class Inputs:
             elif name not in places:
                 raise DeclarationError(unknown_input(layout.owner, name, places))
             elif isinstance(value, Signal):
-                self._signals.append((places[name], value.value))
-                breakpoints += _finite_breakpoints(name, value)
+                times = _finite_breakpoints(name, value)
+                self._signals.append((places[name], value.value, tuple(times)))
+                breakpoints += times
             elif callable(value):
                 require_map(f"input {name}", value, ("t",))
                 if places[name].variable.discrete:
@@ -86,14 +92,14 @@ class Inputs:
                         f"{layout.owner}: input {name} changes at jumps only, so it cannot be a plain "
                         "function of time: give a number, or a Signal with the times at which it changes."
                     )
-                self._signals.append((places[name], value))
+                self._signals.append((places[name], value, ()))
             else:
                 self.hold(name, value)
         self._breakpoints = sorted(breakpoints)
 
     def _tune(self, place: Place, value: InputValue) -> list[float]:
         """Take what is given for a parameter, and return its breakpoints."""
-        owner, name = self._layout.owner, place.variable.name
+        owner, name = self.layout.owner, place.variable.name
         require_tunable(owner, place.variable, value)
         if isinstance(value, Signal):
             times = _finite_breakpoints(name, value)
@@ -127,10 +133,10 @@ class Inputs:
 
     def hold(self, name: str, value: npt.ArrayLike) -> bool:
         """Set an input to a constant; return whether that changed it."""
-        place = next((q for q in self._layout.places[Kind.INPUT] if q.variable.name == name), None)
+        place = next((q for q in self.layout.places[Kind.INPUT] if q.variable.name == name), None)
         if place is None:
-            raise DeclarationError(unknown_input(self._layout.owner, name, dict.fromkeys(self.names)))
-        given = start_array(f"{self._layout.owner}.{name}", value)
+            raise DeclarationError(unknown_input(self.layout.owner, name, dict.fromkeys(self.names)))
+        given = start_array(f"{self.layout.owner}.{name}", value)
         if given.shape not in ((), place.variable.shape):
             raise DeclarationError(
                 f"input {name} has shape {place.variable.shape}, but the value given has shape {given.shape}: give one "
@@ -157,7 +163,16 @@ class Inputs:
     @property
     def names(self) -> list[str]:
         """Names of the inputs."""
-        return [place.variable.name for place in self._layout.places[Kind.INPUT]]
+        return [place.variable.name for place in self.layout.places[Kind.INPUT]]
+
+    @property
+    def signals(self) -> Sequence[tuple[Place, Callable[[float], npt.ArrayLike], tuple[float, ...]]]:
+        """The inputs that are functions of time: their places, functions, and breakpoints in s."""
+        return self._signals
+
+    def breakpoints_in(self, t0: float, t1: float) -> list[float]:
+        """Return the breakpoints of inputs and parameters in (t0, t1], in order, each once."""
+        return sorted({b for b in self._breakpoints if t0 < b <= t1})
 
     @property
     def vary(self) -> bool:
@@ -173,8 +188,8 @@ class Inputs:
         if not self._signals:
             return held
         u = held.copy()
-        for place, signal in self._signals:
-            u[place.at] = _sample(place.variable, signal, t)
+        for place, signal, _ in self._signals:
+            u[place.at] = sampled_signal(place.variable, signal, t)
         return u
 
     def next_breakpoint(self, t: float) -> float:
@@ -229,7 +244,14 @@ def _finite_breakpoints(name: str, signal: Signal) -> list[float]:
     return [float(b) for b in breakpoints]
 
 
-def _sample(variable: Variable, signal: Callable[[float], npt.ArrayLike], t: float) -> FloatArray:
+def sampled_signal(variable: Variable, signal: Callable[[float], npt.ArrayLike], t: float) -> FloatArray:
+    """Return what a function of time gives for an input at `t` in s: one number for all elements, or a row.
+
+    Raises
+    ------
+    SimulationError
+        If that is no finite number, or of another shape than the input.
+    """
     given = signal(t)
     try:
         value = real_array(given)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hybrid_model.declare.automaton import Automaton
-from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.layout import layout_of
 from hybrid_model.declare.variables import FloatArray, Kind
 
 
@@ -30,7 +30,7 @@ class VectorForm:
 
     def __init__(self, automaton: Automaton) -> None:
         self.automaton = automaton
-        self.layout = Layout(automaton)
+        self.layout = layout_of(automaton)
 
     def start(
         self, t: float, x: FloatArray, z: FloatArray, u: FloatArray, p: FloatArray

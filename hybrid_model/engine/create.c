@@ -31,6 +31,7 @@ static EngineOptions default_options(const Model *m)
     return (EngineOptions){
         .relative_tolerance = RELATIVE_TOLERANCE,
         .longest_step = INFINITY,
+        .barrier = INFINITY,
         .jumps_at_once = m->scales.jumps_at_once,
         .jumps_in_window = m->scales.jumps_in_window,
         .spread = m->scales.spread,
@@ -61,10 +62,12 @@ void engine_reset(Engine *engine)
     engine->statistics = (Statistics){0};
     engine_record(engine, RECORD_NOTHING);
     engine->status->stop_time = INFINITY;
-    engine_copy(engine->live.x, m->x, m->n_states);
-    engine_copy(engine->live.z, m->z, m->n_discrete);
-    engine_copy(engine->u, m->u, m->n_inputs);
-    engine_copy(engine->p, m->p, m->n_parameters);
+    if (m->x) {
+        engine_copy(engine->live.x, m->x, m->n_states);
+        engine_copy(engine->live.z, m->z, m->n_discrete);
+        engine_copy(engine->u, m->u, m->n_inputs);
+        engine_copy(engine->p, m->p, m->n_parameters);
+    }
     engine->view = VIEW_NONE;
     engine_fail(engine, ENDED_NOT, "%s", "");
 }

@@ -33,6 +33,7 @@ typedef struct {
     double relative_tolerance;  /* of a step */
     double absolute_tolerance;  /* of a step, in the unit of each state; 0: a part of the states' own sizes */
     double longest_step;        /* s */
+    double barrier;             /* s; where inputs may change from outside: no flow is looked at beyond it */
     double event_tolerance;     /* s and margin: what counts as one instant, and as a border; 0: follows from the run */
     /* What counts as an accumulation of jumps: see ZenoGuard in hybrid_model/reference/zeno.py. */
     double jumps_at_once, jumps_in_window, spread;

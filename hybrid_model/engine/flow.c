@@ -105,7 +105,7 @@ FlowEnd engine_flow(Engine *engine, const Point *point, double limit, bool locat
             return FLOW_EVENT;
         if (*point->time >= limit)
             return FLOW_REACHED;
-        double piece_end = engine_next_time(engine, point, locate, true); /* line 11 */
+        double piece_end = fmin(engine_next_time(engine, point, locate, true), engine->options.barrier); /* line 11 */
         FlowEnd result = flow_piece(engine, point, limit, piece_end, locate, budget);
         bool near = piece_end <= limit && piece_end - *point->time <= engine_one_instant(engine, piece_end);
         if (result == FLOW_EVENT && near && *point->time < piece_end) /* line 15 */

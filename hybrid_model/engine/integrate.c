@@ -35,8 +35,9 @@ static bool step_too_small(Engine *engine, const Point *point, double h, bool fi
         return engine_fail(
             engine, ENDED_NOT_FINITE,
             "'%s' = %.17g does not stay finite beyond t = %.17g. Remedy: check the flow map for a division "
-            "by zero or a finite escape time, or keep the state in a flow set.",
-            name, value, *point->time);
+            "by zero or a finite escape time, or keep the state in a flow set; trial steps look a little outside of "
+            "it, where np.maximum(%s, 0) keeps a root defined.",
+            name, value, *point->time, name);
     return engine_too_small(engine, point, h);
 }
 

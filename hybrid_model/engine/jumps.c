@@ -24,10 +24,11 @@ static bool refused(Engine *engine, Ending ending, size_t jump, size_t i, double
 {
     const Model *m = engine->model;
     bool starts = jump == m->n_jumps;
-    return engine_fail(engine, ending, "'%s' becomes %.17g at t = %.17g by %s%s%s; %s",
-                       NAME_AT(m->names, engine_state_name(m, i)), engine->reset.x[i], t,
-                       starts ? "its start value" : "the jump map of '",
-                       starts ? "" : NAME_AT(m->names, m->jumps[jump].name), starts ? "" : "'", rule);
+    const char *state = NAME_AT(m->names, engine_state_name(m, i));
+    if (starts)
+        return engine_fail(engine, ending, "%s = %.17g at the start: %s", state, engine->reset.x[i], rule);
+    return engine_fail(engine, ending, "%s = %.17g after jump '%s' at t = %.9g s: %s", state, engine->reset.x[i],
+                       NAME_AT(m->names, m->jumps[jump].name), t, rule);
 }
 
 static bool is_integer(double value)
@@ -43,7 +44,7 @@ static bool accept_state(Engine *engine, size_t jump, const Point *point)
     for (size_t i = 0; i < m->n_states + m->n_discrete; i++)
         if (!isfinite(engine->reset.x[i]))
             return refused(engine, ENDED_NOT_FINITE, jump, i, *point->time,
-                           "states must be finite. Remedy: check that map and the parameters.");
+                           "states must stay finite numbers. Remedy: check that map and the parameters.");
     for (size_t i = 0; i < m->n_discrete; i++)
         if (m->whole[i] && !is_integer(engine->reset.z[i]))
             return refused(engine, ENDED_FAILED, jump, m->n_states + i, *point->time,
@@ -80,8 +81,8 @@ bool engine_evaluate_times(Engine *engine, const Point *point)
     for (size_t j = 0; j < m->n_jumps; j++)
         if (m->jumps[j].kind == JUMP_ON_TIME && isnan(engine->times[m->jumps[j].index]))
             return engine_fail(engine, ENDED_NOT_FINITE,
-                               "The time of '%s' is not a number at t = %.17g; a time event needs a time (infinity: "
-                               "never). Remedy: check its expression and the parameters.",
+                               "the time of jump '%s' is not a number at t = %.9g s; a time event needs a time "
+                               "(infinity: never). Remedy: check its expression and the parameters.",
                                NAME_AT(m->names, m->jumps[j].name), *point->time);
     return true;
 }

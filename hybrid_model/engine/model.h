@@ -63,7 +63,7 @@ typedef struct {
     bool flow_priority;                /* flow wins where flow set and jump set overlap (default: jump) */
     bool has_flow_set;                 /* false: flow is allowed everywhere */
     bool predictable;                  /* all inputs discrete: the next event follows from the state */
-    const double *x, *z, *u, *p;       /* start values */
+    const double *x, *z, *u, *p;       /* start values; NULL where whoever runs the model has them */
     const double *nominals;            /* a usual size of each continuous state, 0 if none is declared */
     const bool *whole;                 /* of each discrete state: whether it is declared integer */
     ModelScales scales;

@@ -27,8 +27,8 @@ bool engine_evaluate_margins(Engine *engine, double t, const double *x, const do
         if (isnan(engine->margins[i]))
             return engine_fail(
                 engine, ENDED_NOT_FINITE,
-                "The jump margin '%s' is not a number at t = %.17g; margins must be numbers. Remedy: check "
-                "the jump set for 0/0 or the root of a negative number.",
+                "the margin of jump '%s' is not a number at t = %.9g s: it must be defined wherever a flow or a jump "
+                "leads. Remedy: check the jump set for 0/0 or the root of a negative number.",
                 NAME_AT(m->names, m->margin_names[i]), t);
     return true;
 }
@@ -40,9 +40,10 @@ bool engine_evaluate_flow_set(Engine *engine, double t, const double *x, const d
         return engine_fail(engine, ENDED_FAILED, "The flow set of '%s' could not be evaluated at t = %.17g.", name, t);
     if (isnan(*margin))
         return engine_fail(engine, ENDED_NOT_FINITE,
-                           "The margin of the flow set of '%s' is not a number at t = %.17g; margins must be numbers. "
-                           "Remedy: check the flow set for 0/0 or the root of a negative number.",
-                           name, t);
+                           "the margin of the flow set is not a number at t = %.9g s: it must be defined wherever a "
+                           "flow or a jump leads. Remedy: check the flow set for 0/0 or the root of a negative "
+                           "number.",
+                           t);
     return true;
 }
 
@@ -51,9 +52,9 @@ bool engine_blocked(Engine *engine, double t, const double *x, const double *z, 
     char values[MESSAGE_SIZE / 2];
     return engine_fail(
         engine, ENDED_BLOCKED,
-        "Blocked: at t = %.17g the state is outside the flow set (margin %.6g < 0) and no jump is enabled; "
-        "%s. Remedy: extend the flow set or the jump set so that one of them holds the state.",
-        t, margin, engine_describe_state(engine, x, z, values, sizeof values));
+        "Blocked: the state is in neither the flow set nor the jump set at t = %.9g s: %s; margin of the flow set "
+        "%.3g. Enlarge one of the sets, or make the jump map land in their union.",
+        t, engine_describe_state(engine, x, z, values, sizeof values), margin);
 }
 
 /* The margin of the flow set at a point that the run need not reach; not a number if there is none. */

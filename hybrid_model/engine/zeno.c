@@ -135,9 +135,10 @@ bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long cou
             "declare the clock's state with computed=True and let start_map give the next time to come.",
             count, name, t);
     return engine_fail(engine, ENDED_ZENO,
-                       "Zeno: %llu jumps of '%s' at one instant, t = %.10g s. "
-                       "Remedy: let the jump leave its jump set, or give the jump set a minimum dwell time; a trigger "
-                       "whose two sides are both zero fires for ever unless its inequality is strict.",
+                       "Zeno: %llu jumps of '%s' at one instant, t = %.9g s: after the jump the state is still in the "
+                       "jump set. Make the jump map leave the jump set, or let the margin be negative there (a "
+                       "threshold that is zero together with its error fires for ever; so does a set given as 0 "
+                       "outside and 1 inside, because zero is inside).",
                        count, name, t);
 }
 
@@ -161,16 +162,15 @@ bool engine_zeno_record(Engine *engine, size_t jump)
         if (rest <= fmax(remainder, scales->resolved * engine_time_ulp(t)))
             return engine_fail(
                 engine, ENDED_ZENO,
-                "Zeno: %llu jumps of '%s' up to t = %.10g s accumulate at t = %.10g s (last gap %.2g s, "
-                "ratio %.3f). Remedy: end the run before that time, or give the jump set a minimum dwell "
-                "time.",
-                total, NAME_AT(engine->model->names, name), t, t + rest, gap, ratio);
+                "Zeno: %llu jumps of '%s' accumulate at t = %.12g s (the last gap was %.2g s, each %.3f times the "
+                "one before). End the run before that time, or give the jump set a minimum dwell time.",
+                total, NAME_AT(engine->model->names, name), t + rest, gap, ratio);
     }
     if (crowded(engine, history, t))
         return engine_fail(
             engine, ENDED_ZENO,
-            "Zeno: %llu jumps of '%s' in %.2g s around t = %.10g s. Remedy: end the run before that time, "
-            "or give the jump set a minimum dwell time.",
+            "Zeno: %llu jumps of '%s' in %.2g s around t = %.12g s: jumps accumulate there. End the run before, or "
+            "give the jump set a minimum dwell time.",
             burst, NAME_AT(engine->model->names, name), t - history->burst_start, t);
     return true;
 }

@@ -29,7 +29,7 @@ def model_code(traced: Trace | NetworkTrace) -> str:
         A C99 translation unit that defines ``const Model model``.
     """
     maps, work = _maps(traced, derivatives=True)
-    model = _model(traced, work, traced.automaton.name)
+    model = _model(traced, work, traced.automaton.name, starts=True)
     return "\n".join([_PRELUDE, maps, *_tables(traced, starts=True), model])
 
 
@@ -47,11 +47,11 @@ def run_code(traced: Trace | NetworkTrace) -> str:
     Returns
     -------
     str
-        A C99 translation unit that exports ``hybrid_model_of_run``, which returns the model.
+        A C99 translation unit that defines ``const Model model``, for `hybrid_model.native.build.libraries`.
     """
     maps, work = _maps(traced, derivatives=False)
-    model = _model(traced, work, type(traced.automaton).__name__)
-    return "\n".join([_PRELUDE, maps, *_tables(traced, starts=False), model, _ACCESS])
+    model = _model(traced, work, type(traced.automaton).__name__, starts=False)
+    return "\n".join([_PRELUDE, maps, *_tables(traced, starts=False), model])
 
 
 def _maps(traced: Trace | NetworkTrace, *, derivatives: bool) -> tuple[str, Sequence[int]]:
@@ -69,6 +69,7 @@ _MAPS = (
     *("start", "flow", "flow_set", "margins", "times", "outputs", "reset"),
     *("forward", "reverse", "start_forward", "start_reverse"),
 )
+_VECTORS = {"x": Kind.STATE, "z": Kind.DISCRETE, "u": Kind.INPUT, "p": Kind.PARAMETER}
 _PRELUDE = """\
 /* Generated from an automaton.  Its names stay inside, and its maps need not use all that they are given. */
 #include <math.h>
@@ -84,29 +85,14 @@ static int hybrid_reset(size_t jump, const double **arg, double **res, long long
 }
 """
 _NO_DERIVATIVES = "\n".join(f"#define hybrid_{name} NULL" for name in _MAPS[-4:])
-_ACCESS = """
-#if defined(_WIN32)
-__declspec(dllexport)
-#elif defined(__GNUC__)
-__attribute__((visibility("default")))
-#endif
-const Model *hybrid_model_of_run(void);
-const Model *hybrid_model_of_run(void)
-{
-    return &model;
-}
-"""
 
 
 def _tables(traced: Trace | NetworkTrace, *, starts: bool) -> list[str]:
     automaton, layout, names = traced.automaton, traced.layout, NameTable()
-    vectors = [("x", Kind.STATE), ("z", Kind.DISCRETE), ("u", Kind.INPUT), ("p", Kind.PARAMETER)]
+    vectors = _VECTORS if starts else {}
     margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
     tables = [
-        *(
-            array("double", f"start_{name}", map(constant, layout.start(kind) * float(starts)))
-            for name, kind in vectors
-        ),
+        *(array("double", f"start_{name}", map(constant, layout.start(kind))) for name, kind in vectors.items()),
         array("double", "nominals", map(constant, _nominals(layout))),
         array("bool", "whole", map(boolean, layout.whole)),
         array("ModelName", "state_names", map(names.entry, layout.names(Kind.STATE))),
@@ -137,13 +123,13 @@ def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
     return rows
 
 
-def _model(traced: Trace | NetworkTrace, work: Sequence[int], name: str) -> str:
+def _model(traced: Trace | NetworkTrace, work: Sequence[int], name: str, *, starts: bool) -> str:
     automaton, sizes = traced.automaton, traced.layout.sizes
     fields = {
         "name": string(name),
         "n_states": sizes[Kind.STATE],
         "n_discrete": sizes[Kind.DISCRETE],
-        "n_inputs": sizes[Kind.INPUT],
+        "n_inputs": traced.inputs,
         "n_parameters": sizes[Kind.PARAMETER],
         "n_outputs": sizes[Kind.OUTPUT],
         "n_margins": sum(info.trigger is Trigger.STATE for info in automaton.jumps),
@@ -153,7 +139,7 @@ def _model(traced: Trace | NetworkTrace, work: Sequence[int], name: str) -> str:
         "flow_priority": boolean(automaton.priority is Priority.FLOW),
         "has_flow_set": boolean(automaton.has_flow_set),
         "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
-        **{name: f"start_{name}" for name in ("x", "z", "u", "p")},
+        **{name: f"start_{name}" if starts else "NULL" for name in _VECTORS},
         **{name: f"hybrid_{name}" for name in _MAPS},
         "scales": row(*(f".{name} = {_number(value)}" for name, value in scales.of_models().items())),
         **{name: name for name in ("nominals", "whole", "jumps")},

@@ -152,7 +152,33 @@ def _norm(vector: Any) -> Any:
     return np.sqrt(np.sum(vector * vector))
 
 
-_REWRITTEN: dict[Callable[..., Any], Callable[..., Any]] = {np.where: _where, np.clip: _clip, np.linalg.norm: _norm}
+def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Symbols:
+    places, values = np.asarray(xp), np.asarray(fp)
+    if places.dtype == object or values.dtype == object or period is not None or np.ndim(places) != 1:
+        raise TraceError("np.interp can be traced for a table of numbers, without a period only.")
+    if len(places) != len(values) or not 1 <= len(places) <= TABLE_MOST or not (np.diff(places) > 0.0).all():
+        raise TraceError(
+            f"np.interp can be traced for 1 to {TABLE_MOST} places in increasing order, with a value each; it has "
+            f"{len(places)} places and {len(values)} values."
+        )
+    below, above = values[0] if left is None else left, values[-1] if right is None else right
+
+    def at(given: Any) -> Any:
+        inside = ca.pw_lin(given, places, values) if len(places) > 1 else values[0]
+        return ca.if_else(given < places[0], below, ca.if_else(given > places[-1], above, inside))
+
+    return symbols(np.frompyfunc(at, 1, 1)(_plain(x)))
+
+
+TABLE_MOST = 1000
+"""Places in a table: an evaluation passes all of them."""
+
+_REWRITTEN: dict[Callable[..., Any], Callable[..., Any]] = {
+    np.where: _where,
+    np.clip: _clip,
+    np.linalg.norm: _norm,
+    np.interp: _interp,
+}
 
 
 def symbols(value: Any) -> Symbols:

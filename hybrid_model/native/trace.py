@@ -56,6 +56,11 @@ class Trace:
     resets: tuple[ca.Function, ...]
 
     @property
+    def inputs(self) -> int:
+        """Number of scalars in u."""
+        return int(self.flow.size1_in(ARGUMENTS.index("u")))
+
+    @property
     def functions(self) -> tuple[ca.Function, ...]:
         """All functions, in a fixed order."""
         return (self.start, self.flow, self.flow_set, self.margins, self.times, self.outputs, *self.resets)
@@ -210,7 +215,7 @@ class _Tracer:
         except (RuntimeError, TypeError) as error:
             raise TraceError(
                 f"{what} of {self.automaton.name} cannot be traced: {error} Remedy: functions that need the numbers "
-                "themselves (np.argmax, np.sort, np.interp, ...) have no symbols; write np.where, np.minimum, "
+                "themselves (np.argmax, np.sort, ...) have no symbols; write np.where, np.minimum, "
                 "np.maximum and arithmetic instead."
             ) from error
 

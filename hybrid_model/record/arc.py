@@ -37,16 +37,16 @@ class HybridArc:
 
     Attributes
     ----------
-    t, j : ndarray, shape (n,)
-        Hybrid time of the samples: every solver step and both sides of every jump.
-    jumps : list of JumpRecord
-        In order, with the states on both sides.
     stop : Stop
         Why the run ended; its value is the remedy. A restricted arc keeps the reason of the whole run.
     message : str
         The particulars of the end, with names and numbers.
     event_tolerance : float
         Longest time in s that the run has taken for one instant, see `Solver`.
+    engine : str
+        Which engine ran, and why, in one sentence; empty for an arc from a file.
+    statistics : RunStatistics or None
+        Steps, evaluations and the like, where the native engine ran.
     automaton : Automaton
         What ran. That of a loaded arc has names, variables and jumps, but no maps.
     """
@@ -55,9 +55,35 @@ class HybridArc:
         self._record, self._read, self._flows = record, record.read, record.flows
         self.automaton: Automaton = record.read.automaton
         self.stop, self.message, self.event_tolerance = record.stop, record.message, record.event_tolerance
-        self._starts, self._ends = starts_of(record.flows), ends_of(record.flows)
-        self.t, self._numbers = sampled(record.flows)
-        self.j = record.first_j + self._numbers
+        self.engine, self.statistics = record.engine, record.statistics
+
+    # Computed when they are first asked for: a run may be wanted for its jumps, or for its end.
+
+    @functools.cached_property
+    def _starts(self) -> FloatArray:
+        return starts_of(self._flows)
+
+    @functools.cached_property
+    def _ends(self) -> FloatArray:
+        return ends_of(self._flows)
+
+    @functools.cached_property
+    def _sampled(self) -> tuple[FloatArray, npt.NDArray[np.int64]]:
+        return sampled(self._flows)
+
+    @property
+    def _numbers(self) -> npt.NDArray[np.int64]:
+        return self._sampled[1]
+
+    @property
+    def t(self) -> FloatArray:
+        """Times in s of the samples: every solver step and both sides of every jump."""
+        return self._sampled[0]
+
+    @functools.cached_property
+    def j(self) -> npt.NDArray[np.int64]:
+        """Jump counts of the samples."""
+        return self._record.first_j + self._numbers
 
     @functools.cached_property
     def jumps(self) -> list[JumpRecord]:

@@ -8,13 +8,14 @@ else about arcs is the same for both.
 from __future__ import annotations
 
 import bisect
+import functools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
 
 from hybrid_model.declare.automaton import Automaton
-from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.layout import Place, layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, unknown_name
 from hybrid_model.errors import DeclarationError
@@ -31,8 +32,11 @@ class ArcValues(ABC):
 
     def __init__(self, automaton: Automaton) -> None:
         self.automaton = automaton
-        self.layout = Layout(automaton)
-        self._places = {place.variable.name: place for places in self.layout.places.values() for place in places}
+        self.layout = layout_of(automaton)
+
+    @functools.cached_property
+    def _places(self) -> dict[str, Place]:
+        return {place.variable.name: place for places in self.layout.places.values() for place in places}
 
     @abstractmethod
     def states(self, x: FloatArray) -> FloatArray:

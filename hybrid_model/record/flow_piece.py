@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from hybrid_model.declare.variables import FloatArray
+from hybrid_model.errors import DeclarationError
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +49,29 @@ class FlowPiece:
 def straight_piece(t0: float, t1: float, x0: FloatArray, x1: FloatArray) -> FlowPiece:
     """Return the piece of a flow that is a straight line from x0 at t0 to x1 at t1."""
     return FlowPiece(t0, t1, x0, x1, _Line(t0, t1, x0, x1))
+
+
+def unseen(pieces: Sequence[FlowPiece]) -> list[FlowPiece]:
+    """Return one piece in place of many, of which the ends alone are kept."""
+    if not pieces:
+        return []
+    first, last = pieces[0], pieces[-1]
+    return [FlowPiece(first.t0, last.t1, first.x0, last.x1, refuse_inside)]
+
+
+def refuse_inside(t: float | FloatArray) -> NoReturn:
+    """Refuse a state inside a flow of a run that has kept its events only.
+
+    Raises
+    ------
+    DeclarationError
+        Always.
+    """
+    time = float(np.asarray(t).ravel()[0])
+    raise DeclarationError(
+        f"the run has kept its events only, and t = {time:.9g} s lies between two of them: run it with "
+        'record="all" for the states there.'
+    )
 
 
 @dataclass(frozen=True, eq=False)

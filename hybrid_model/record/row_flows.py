@@ -14,12 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from hybrid_model.declare.variables import FloatArray
-from hybrid_model.record.flow_piece import FlowPiece
+from hybrid_model.record.flow_piece import FlowPiece, refuse_inside
 from hybrid_model.record.flow_record import FlowRecord
 from hybrid_model.record.jump_record import JumpRecord
 
 Counts = npt.NDArray[np.int64]
 
+_VECTORS = 5
 _BEFORE_STATES = 3
 """Numbers in a row before those of the states."""
 
@@ -39,6 +40,8 @@ class Rows:
         Numbers of scalar states.
     names : tuple of str
         Of the automaton's jumps.
+    events_only : bool
+        Whether the steps stand for whole flows, of which the ends alone are known.
     """
 
     steps: FloatArray
@@ -46,6 +49,20 @@ class Rows:
     states: int
     discrete: int
     names: tuple[str, ...]
+    events_only: bool = False
+
+    @classmethod
+    def of_events(cls, jumps: FloatArray, end: float, x: FloatArray, discrete: int, names: tuple[str, ...]) -> Rows:
+        """Return the rows of a run of which the jumps were recorded, and its end: time in s and states."""
+        states = len(x)
+        starts, ends = jumps[:, 1], np.append(jumps[1:, 1], end)
+        reached = np.vstack([jumps[1:, _BEFORE_STATES : _BEFORE_STATES + states], x])
+        flown = ends > starts
+        unknown = np.full((len(jumps), _VECTORS * states), np.nan)
+        steps = np.hstack([starts[:, None], ends[:, None], ends[:, None], reached, unknown])[flown]
+        counted = jumps.copy()
+        counted[:, 0] = np.concatenate([[0], np.cumsum(flown)[:-1]])
+        return cls(steps, counted, states, discrete, names, events_only=True)
 
     @functools.cached_property
     def firsts(self) -> Counts:
@@ -89,7 +106,8 @@ class Rows:
     def vectors(self, step: int | Counts) -> FloatArray:
         """Return the vectors of the interpolation of a step, shape (vectors, states), or of steps."""
         given = self.steps[step, _BEFORE_STATES + self.states :]
-        return given.reshape(*given.shape[:-1], -1, self.states)
+        count = given.shape[-1] // self.states if self.states else _VECTORS
+        return given.reshape(*given.shape[:-1], count, self.states)
 
     def at(self, flows: Counts, times: FloatArray) -> FloatArray:
         """Return the states in flows at times in them, shape (times, states)."""
@@ -101,6 +119,8 @@ class Rows:
         # A flow's steps lie in order: count those that end before the time, as far back as the flow goes.
         step = self._steps_at(k, t)
         row = self.steps[step]
+        if self.events_only and (t < row[:, 2]).any():
+            refuse_inside(t[t < row[:, 2]])
         found = nested(self.vectors(step), ((t - row[:, 0]) / (row[:, 1] - row[:, 0]))[:, None])
         states[inside] = np.where((t >= row[:, 2])[:, None], self.reached[step], found)
         return states
@@ -168,7 +188,8 @@ class RowFlows(Sequence[FlowRecord]):
         for step in range(rows.firsts[k], rows.firsts[k + 1]):
             t0, t1, end = (float(t) for t in rows.steps[step, :_BEFORE_STATES])
             reached = rows.reached[step]
-            pieces.append(FlowPiece(t0, end, x, reached, _Interpolation(t0, t1, rows.vectors(step))))
+            inside = refuse_inside if rows.events_only else _Interpolation(t0, t1, rows.vectors(step))
+            pieces.append(FlowPiece(t0, end, x, reached, inside))
             x = reached
         return FlowRecord(float(rows.starts[k]), x0, rows.held[k], tuple(pieces))
 

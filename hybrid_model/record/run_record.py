@@ -11,6 +11,29 @@ from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.stop import Stop
 
 
+@dataclass(frozen=True)
+class RunStatistics:
+    """What a run on the native engine has cost.
+
+    Attributes
+    ----------
+    steps, rejected : int
+        Steps of the solver, and tries that were too long.
+    evaluations : int
+        Of the flow map.
+    jumps : int
+        Breakpoints of the flow included.
+    probes : int
+        States looked at between the ends of a step, to locate events.
+    """
+
+    steps: int
+    rejected: int
+    evaluations: int
+    jumps: int
+    probes: int
+
+
 @dataclass(frozen=True, eq=False)
 class RunRecord:
     """A run, or a part of one.
@@ -27,6 +50,10 @@ class RunRecord:
         See `HybridArc`.
     first_j : int
         Jump count of the first flow.
+    engine : str
+        What ran, and why; see `HybridArc`.
+    statistics : RunStatistics or None
+        What the run has cost, where the engine counts it.
     """
 
     read: ArcValues
@@ -36,3 +63,5 @@ class RunRecord:
     message: str
     event_tolerance: float
     first_j: int = 0
+    engine: str = ""
+    statistics: RunStatistics | None = None

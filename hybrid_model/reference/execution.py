@@ -21,10 +21,11 @@ from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.reference.flow import flow_to_first_event
 from hybrid_model.reference.point import Point
 from hybrid_model.reference.tolerances import border, leads_out
-from hybrid_model.reference.zeno import ZenoGuard, ZenoMonitor
+from hybrid_model.reference.zeno import ZenoMonitor
 from hybrid_model.scales import ROUNDINGS, ulp
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
+from hybrid_model.zeno_guard import ZenoGuard
 
 _QUIET = np.errstate(all="ignore")
 """Values that are not finite are found and named by the checks of rule 10, not by numpy's warnings."""

@@ -26,11 +26,11 @@ from hybrid_model.record.arc_values import ReceivedValues
 from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.run_record import RunRecord
 from hybrid_model.reference.execution import Execution
-from hybrid_model.reference.zeno import ZenoGuard
 from hybrid_model.schedule.automaton_block import AutomatonBlock
 from hybrid_model.schedule.scheduler import Scheduler
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
+from hybrid_model.zeno_guard import ZenoGuard
 
 
 @dataclass(frozen=True, eq=False)

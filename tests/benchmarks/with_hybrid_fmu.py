@@ -34,22 +34,21 @@ def event_names(problem):
 
 
 def simulate(problem, tolerance):
-    return _simulated(problem, automaton_of(problem), tolerance)
+    return _simulated(problem, tolerance, "native")
 
 
-def simulate_compiled(problem, tolerance):
-    from hybrid_model.native.compiled import compiled
-
-    return _simulated(problem, compiled(automaton_of(problem)), tolerance)
+def simulate_python(problem, tolerance):
+    return _simulated(problem, tolerance, "python")
 
 
-def _simulated(problem, automaton, tolerance):
+def _simulated(problem, tolerance, engine):
+    automaton = automaton_of(problem)
     names = event_names(problem)
     states = [f"agent{i}.x" for i in _agents(problem)] if isinstance(problem, Consensus) else ["h", "v"]
     solver = hm.Solver(rtol=tolerance, atol=tolerance / 100)
 
     def run():
-        arc = hm.simulate(automaton, problem.t_end, solver=solver)
+        arc = hm.simulate(automaton, problem.t_end, solver=solver, engine=engine)
         x_end = np.array([float(arc.end[name]) for name in states])
         ended = "end time" if arc.stop is hm.Stop.HORIZON else f"{arc.stop.name}: {arc.message}"
         return Outcome([arc.event_times(name) for name in names], x_end, float(arc.t[-1]), ended)

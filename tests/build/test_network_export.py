@@ -12,7 +12,6 @@ import hybrid_model as hm
 from fmu.export import export_fmu
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import read_scenario
-from hybrid_model.native.compiled import compiled
 from hybrid_model.native.networks.network import worth_looping
 
 
@@ -44,7 +43,7 @@ def test_a_network_runs_like_the_whole(exported, weights, fmi):
     composition = closed_loop(network(14, weights))
     assert worth_looping(composition)
     end = 0.8
-    arc = hm.simulate(compiled(composition), end)
+    arc = hm.simulate(composition, end)
     names = [f"agent{k}.{item}" for k in range(1, 15) for item in ("x", "broadcast", "events")]
     path = exported(composition, fmi=fmi)
     run = fmpy.simulate_fmu(

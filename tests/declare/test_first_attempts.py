@@ -13,7 +13,6 @@ from fmu.errors import ExportError
 from fmu.export import export_fmu
 from hybrid_model.declare.state_space import state_space
 from hybrid_model.models import BouncingBall, RestingBall
-from hybrid_model.native.compiled import compiled
 from hybrid_model.native.trace import trace
 
 
@@ -373,7 +372,6 @@ class Counter(hm.HybridAutomaton):
         BouncingBall,
         lambda: hm.Composition("both", {"a": Heating(), "b": Counter()}),
         lambda: hm.MinimumDwell(Heating(), 0.1),
-        lambda: compiled(Heating()),
         lambda: state_space([[-1.0]], [[1.0]], [[2.0]], [[3.0]], inputs=["u"], outputs=["y"], start=1.0),
         lambda: state_space(
             [[0.5]], [[1.0]], [[2.0]], inputs=["u"], outputs=["y"], period=0.25, name="clocked", start=1.0

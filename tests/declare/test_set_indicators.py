@@ -6,7 +6,7 @@ import pytest
 import hybrid_model as hm
 from hybrid_model.errors import TraceError
 from hybrid_model.models import BouncingBall
-from hybrid_model.native.compiled import compiled
+from hybrid_model.native.trace import trace
 
 
 def ball(flow_set=None, jump_set=None):
@@ -64,7 +64,7 @@ def test_a_jump_set_of_zeros_and_ones_as_floats_stops_at_once_and_says_why():
 )
 def test_a_traced_comparison_is_refused(condition):
     with pytest.raises(TraceError, match="is a comparison: return a margin instead"):
-        compiled(ball(jump_set=condition))
+        trace(ball(jump_set=condition))
 
 
 def test_margins_that_touch_zero_and_one_by_chance_are_none():

@@ -5,7 +5,6 @@ import pytest
 from tuned import CHANGES, EVENTS, JUMPS, POINTS, T_END, TIMES, Tuned, TunedAndDriven, exact, held, signals
 
 import hybrid_model as hm
-from hybrid_model.native.compiled import compiled
 
 # Straight ramps and parabolas are exact up to the roundings of a dozen steps; times of bounces come from roots.
 TIME, STATE = 1e-11, 1e-10
@@ -30,7 +29,7 @@ def test_the_run_is_the_one_in_closed_form(arc):
 
 
 def test_traced_maps_give_the_same_run(arc):
-    check(hm.simulate(compiled(Tuned()), T_END, inputs=signals()))
+    check(hm.simulate(Tuned(), T_END, inputs=signals(), engine="native"))
 
 
 def test_a_part_of_a_composition_is_tuned_by_its_scoped_name():

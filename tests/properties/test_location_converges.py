@@ -23,7 +23,6 @@ from models import test_two_tank as tanks
 
 import hybrid_model as hm
 from hybrid_model import models
-from hybrid_model.native.compiled import compiled
 
 
 @dataclass(frozen=True)
@@ -182,7 +181,7 @@ def library_cases():
 def test_on_every_library_model_event_times_converge(name):
     """The run at default tolerances is held to exact times by the model's own tests; coarser runs tend to it."""
     case = library_cases()[name]
-    automaton, inputs = compiled(case.automaton), step_inputs(case)
+    automaton, inputs = case.automaton, step_inputs(case)
     exact = hm.simulate(automaton, case.t_end, inputs=inputs).jumps
     for rtol in (1e-5, 1e-7, 1e-9, 1e-11):
         solver = hm.Solver(rtol=rtol, atol=rtol / 100)

@@ -6,7 +6,6 @@ import hybrid_model as hm
 from hybrid_model.consensus.certificates.certify import certify
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import read_scenario
-from hybrid_model.native.compiled import compiled
 
 CONSTANT = {"kind": "constant", "value": 1.0}
 
@@ -38,7 +37,7 @@ def path(agents):
 
 def run_of(scenario):
     """The run of the closed loop."""
-    return hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+    return hm.simulate(closed_loop(scenario), scenario.stop_time)
 
 
 def coarse(scenario, arc=None):

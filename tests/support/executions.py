@@ -16,7 +16,7 @@ def reference(name):
 
 
 def python_run(case):
-    return hm.simulate(case.automaton, case.t_end, inputs=step_inputs(case))
+    return hm.simulate(case.automaton, case.t_end, inputs=step_inputs(case), engine="python")
 
 
 def step_inputs(case):

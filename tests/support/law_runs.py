@@ -7,7 +7,6 @@ from cosim.consensus import in_process_system, network_report
 from cosim.masters import run_event_exact
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
-from hybrid_model.native.compiled import compiled
 
 # The limits of the agreement of executions. Events amplify errors, so random runs are short.
 TIME_TOLERANCE = 1e-8
@@ -17,7 +16,7 @@ STATE_ERROR = 1e-11
 
 
 def run(scenario):
-    return hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+    return hm.simulate(closed_loop(scenario), scenario.stop_time)
 
 
 def reported(scenario):

@@ -235,12 +235,27 @@ static bool refuse_indicators(Engine *engine, const Search *search)
         if (zeros > 0 && ones > 0 && zeros + ones == N_SAMPLES)
             return engine_fail(
                 engine, ENDED_FAILED,
-                "The margin of %s'%s' is 0 or 1 along the flow up to t = %.17g, as if it said no or yes. "
+                "The margin of %s%s%s is 0 or 1 along the flow, up to t = %.9g s, as if it said no or yes. "
                 "Remedy: return a number that is zero or above inside the set and negative outside.",
-                row == search->exit_row ? "the flow set of " : "jump ",
-                row == search->exit_row ? m->name : NAME_AT(m->names, m->margin_names[row]), engine->step.t1);
+                row == search->exit_row ? "the flow set" : "jump '",
+                row == search->exit_row ? "" : NAME_AT(m->names, m->margin_names[row]),
+                row == search->exit_row ? "" : "'", engine->step.t1);
     }
     return true;
+}
+
+/* A flow that began outside by rounding, and has come inside, is held to the set itself. */
+static void hold_to_set(Search *search)
+{
+    double *exits = search->engine->samples + search->exit_row;
+    bool inside = false;
+    for (size_t i = 0; i < N_SAMPLES; i++)
+        inside = inside || search->level - engine_sample(search, i, search->exit_row) >= 0.0;
+    if (!inside || !(search->level < 0.0))
+        return;
+    for (size_t i = 0; i < N_SAMPLES; i++)
+        exits[i * search->n_rows] -= search->level;
+    search->level = 0.0;
 }
 
 FlowEnd engine_locate_event(Engine *engine, const Point *point, double level, double piece_end)
@@ -256,6 +271,7 @@ FlowEnd engine_locate_event(Engine *engine, const Point *point, double level, do
     }
     if (!refuse_indicators(engine, &search))
         return FLOW_PROBLEM;
+    hold_to_set(&search);
     double guard = INFINITY, leaving = INFINITY; /* lines 16 and 17 */
     bool has_guard = engine_first_guard(&search, &guard);
     /* An exit within one instant before a guard, or after it, gives way. */

@@ -13,13 +13,13 @@
 #endif
 
 /* Changes with every change of what follows, so that no process uses a library of another version. */
-#define RUN_INTERFACE 1
+#define RUN_INTERFACE 2
 
 EXPORT int run_interface(void);
 EXPORT Engine *run_create(const Model *model);
 EXPORT EngineOptions *run_options(Engine *engine);
 EXPORT int run_start(Engine *engine, const double *const values[], double start, double stop, int record);
-EXPORT int run_advance(Engine *engine, double target);
+EXPORT int run_advance(Engine *engine, double target, int take);
 EXPORT void run_set(Engine *engine, int bank, size_t index, double value);
 EXPORT const double *run_values(Engine *engine, int bank);
 EXPORT const double *run_rows(const Engine *engine, int kind, size_t *count, size_t *width);
@@ -65,13 +65,14 @@ int run_start(Engine *engine, const double *const values[], double start, double
     return engine_start(engine) || fail(engine);
 }
 
-/* Goes on to the target; the jumps that are due there are taken.  A run that has come there may stay: in neither set
-   it is over (line 4 of docs/semantics.md). */
-int run_advance(Engine *engine, double target)
+/* Goes on to the target; the jumps that are due there are taken if the run ends there, and else left to inputs that
+   change first.  A run that ends must be in one of the sets: in neither it is over (line 4 of docs/semantics.md). */
+int run_advance(Engine *engine, double target, int take)
 {
     double level;
-    Advance advance = engine_advance(engine, target, EVENTS_INSIDE);
-    if (advance != ADVANCE_REACHED || engine_flow_may_begin(engine, &engine->live, &level))
+    engine->options.barrier = take ? INFINITY : target;
+    Advance advance = engine_advance(engine, target, take ? EVENTS_INSIDE : EVENTS_INSIDE_BEFORE_END);
+    if (advance != ADVANCE_REACHED || !take || engine_flow_may_begin(engine, &engine->live, &level))
         return (int)advance;
     engine_end_run(engine);
     return (int)ADVANCE_ENDED;

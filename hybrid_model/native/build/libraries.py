@@ -21,7 +21,7 @@ from hybrid_model.native.build.objects import (
     digest,
     own_units,
 )
-from hybrid_model.native.engine_files import ENGINE_FOLDERS
+from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDER
 
 MODEL_SYMBOL = "model_of_library"
 """The function of a model's library that returns the address of its ``Model``."""
@@ -57,7 +57,8 @@ def engine_library() -> Path:
         If there is no C compiler, or it fails.
     """
     toolchain = _toolchain()
-    sources = [source for folder in ENGINE_FOLDERS for source in sorted(folder.glob("*.c"))]
+    folders = (*ENGINE_FOLDERS, RUNS_FOLDER)
+    sources = [source for folder in folders for source in sorted(folder.glob("*.c"))]
 
     def make(library: Path) -> None:
         with _folder("engine") as folder:
@@ -112,7 +113,8 @@ def _toolchain() -> Toolchain:
 
 
 def _engine_digest(pattern: str) -> str:
-    return digest(file for folder in ENGINE_FOLDERS for file in sorted(folder.glob(pattern)))
+    folders = (*ENGINE_FOLDERS, RUNS_FOLDER)
+    return digest(file for folder in folders for file in sorted(folder.glob(pattern)))
 
 
 @contextmanager

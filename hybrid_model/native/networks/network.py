@@ -106,6 +106,11 @@ class NetworkTrace:
             for elements in by_group[number]
         ]
 
+    @property
+    def inputs(self) -> int:
+        """Number of scalars in u."""
+        return self.layout.sizes[Kind.INPUT]
+
     def c_code(self) -> str:
         """Return C99 that defines the functions of hybrid_model/engine/model.h.
 

@@ -22,7 +22,6 @@ from hybrid_model.consensus.graphs.undirected import weighted_laplacian
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.files import load_scenario
-from hybrid_model.native.compiled import compiled
 
 ROOT = Path(__file__).parents[3]
 PAGE = ROOT / "docs" / "paper-audit.md"
@@ -35,7 +34,7 @@ def example():
     found = {}
     for name in ("static", "dynamic"):
         scenario = load_scenario(f"paper-a-{name}")
-        arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+        arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
         found[name] = (Bounds(analyse(scenario)), run_report(scenario, arc), arc)
     return found
 

@@ -22,7 +22,6 @@ from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.metrics import run_states
 from hybrid_model.consensus.runs.report import edge_norm
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
-from hybrid_model.native.compiled import compiled
 
 SEEDS = [21, 23, *(pytest.param(seed, marks=pytest.mark.long) for seed in (20, 22, 24, 25, 26, 27, 28, 29))]
 
@@ -249,7 +248,7 @@ def test_alpha_v_and_kappa_2_lie_on_their_sides_of_the_exact_values(seed, kind):
 def test_a_run_obeys_the_root_mean_square_bound_and_the_radius():
     scenario = load_scenario("paper-a-static")
     found = compare_edge_domain(scenario, resolution=0.03)
-    arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
     times = np.linspace(0.0, scenario.stop_time, 20001)
     norms = edge_norm(scenario, run_states(scenario, arc)(times))
     start = norms[0] * np.exp(-found.rate * times)

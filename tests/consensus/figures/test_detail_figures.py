@@ -20,13 +20,12 @@ from hybrid_model.consensus.runs.metrics import run_states
 from hybrid_model.consensus.runs.periodic_run import periodic_run
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.files import load_scenario
-from hybrid_model.native.compiled import compiled
 
 
 @pytest.fixture(scope="module")
 def run():
     scenario = replace(load_scenario("paper-a-static"), stop_time=10.0)
-    arc = hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
     return scenario, arc, run_report(scenario, arc).event_times
 
 

@@ -21,13 +21,12 @@ from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.channel import Channel
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.native.compiled import compiled
 
 DAMPING = 1.5
 
 
 def run(scenario, velocities, damping=DAMPING):
-    return hm.simulate(compiled(double_integrator_loop(scenario, velocities, damping)), scenario.stop_time)
+    return hm.simulate(double_integrator_loop(scenario, velocities, damping), scenario.stop_time)
 
 
 def exact_events(scenario, velocities, damping):

@@ -18,7 +18,6 @@ from hybrid_model.consensus.scenario.channel import Channel
 from hybrid_model.consensus.scenario.definition import replace_trigger
 from hybrid_model.consensus.scenario.files import read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.native.compiled import compiled
 
 # The limits of the agreement test.
 TIME_TOLERANCE = 1e-7
@@ -157,7 +156,7 @@ code of an agent that computes ahead grows with its neighbours and takes long to
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in QUICK else [pytest.mark.long]) for n in NETWORKS])
 def test_agents_as_fmus_and_as_automata_run_like_the_closed_loop(name, exported):
     scenario = NETWORKS[name]
-    loop = run_report(scenario, hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time))
+    loop = run_report(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time))
     assert sum(loop.events_per_agent) > 3
     fmus = {
         agent: exported(automaton, f"ring_{name}_{agent}") for agent, automaton in scenario_agents(scenario).items()

@@ -17,13 +17,12 @@ from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.channel import Channel
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.native.compiled import compiled
 
 STARTS = np.array([[1.0, 0.2, -0.3], [-0.4, 0.5, 0.9], [0.3, -0.7, 0.1]])
 
 
 def run(scenario, initial):
-    return hm.simulate(compiled(vector_loop(scenario, initial)), scenario.stop_time)
+    return hm.simulate(vector_loop(scenario, initial), scenario.stop_time)
 
 
 def exact_events(scenario, initial):

@@ -17,7 +17,6 @@ from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.runs.savings import Measure, run_savings
 from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
-from hybrid_model.native.compiled import compiled
 
 
 def pair(trigger, stop_time=6.0):
@@ -45,7 +44,7 @@ def ring(trigger, stop_time=20.0):
 
 
 def run(scenario):
-    return hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time)
+    return hm.simulate(closed_loop(scenario), scenario.stop_time)
 
 
 def test_gaps():

@@ -14,7 +14,6 @@ from hybrid_model.consensus.runs.periodic_run import periodic_run, slow_gain
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.runs.savings import Measure, run_savings
 from hybrid_model.consensus.scenario.files import load_scenario
-from hybrid_model.native.compiled import compiled
 
 PAGE = (Path(__file__).parents[3] / "docs" / "savings.md").read_text(encoding="utf-8")
 ROWS = {
@@ -39,7 +38,7 @@ def number(text):
 def run(request):
     name, column = request.param
     scenario = load_scenario(name)
-    return scenario, hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time), column
+    return scenario, hm.simulate(closed_loop(scenario), scenario.stop_time), column
 
 
 def test_equal_rate(run):

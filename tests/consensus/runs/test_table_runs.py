@@ -12,7 +12,6 @@ from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.definition import replace_trigger
 from hybrid_model.consensus.scenario.files import read_scenario
-from hybrid_model.native.compiled import compiled
 
 # The limits for times of events and for states.
 TIME_TOLERANCE = 1e-7
@@ -82,11 +81,11 @@ def scenarios(draw):
 @settings(max_examples=15, deadline=None)
 @given(scenario=scenarios())
 def test_random_tables_run_like_the_exact_solution(scenario):
-    compare(scenario, compiled(closed_loop(scenario)))
+    compare(scenario, closed_loop(scenario))
 
 
 @pytest.mark.long
 @settings(max_examples=400, deadline=None)
 @given(scenario=scenarios())
 def test_many_random_tables_run_like_the_exact_solution(scenario):
-    compare(scenario, compiled(closed_loop(scenario)))
+    compare(scenario, closed_loop(scenario))

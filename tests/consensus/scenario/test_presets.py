@@ -19,7 +19,6 @@ from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import edge_norm, run_report
 from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
 from hybrid_model.consensus.weights.gated_sine import WeightMap
-from hybrid_model.native.compiled import compiled
 
 DOCS = Path(__file__).parents[3] / "docs"
 PAGE = (DOCS / "presets.md").read_text(encoding="utf-8")
@@ -77,7 +76,7 @@ def test_events_and_final_disagreement_are_those_on_the_page(name, trigger, firs
 @pytest.mark.parametrize("name", [name for name in VARIANTS if name != "paper-a"])
 def test_the_closed_loop_runs_like_the_exact_solution(name):
     scenario = load_scenario(name)
-    report = run_report(scenario, hm.simulate(compiled(closed_loop(scenario)), scenario.stop_time))
+    report = run_report(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time))
     run = exact_run(scenario)
     assert report.events_per_agent == run.counts
     for times, expected in zip(report.event_times, run.event_times, strict=True):

@@ -28,7 +28,6 @@ from hybrid_model.consensus.weights.sampled import SampledWeight
 from hybrid_model.consensus.weights.sine import SineWeight
 from hybrid_model.consensus.weights.square import SquareWeight
 from hybrid_model.consensus.weights.waveform import Waveform
-from hybrid_model.native.compiled import compiled
 
 rates = st.floats(0.05, 30.0)
 phases = st.floats(-20.0, 20.0)
@@ -272,12 +271,12 @@ class TestNeverNegative:
     @pytest.mark.parametrize("end", [0.7, 0.9, 1.1])
     def test_in_runs(self, end):
         block = weights_block([samples_that_end_at_zero(1.3, end)])
-        for arc in (hm.simulate(block, 20.0), hm.simulate(compiled(block), 20.0)):
+        for arc in (hm.simulate(block, 20.0, engine=engine) for engine in ("python", "native")):
             assert arc["weights"].min() == 0.0
 
     def test_a_function_in_runs(self):
         block = weights_block([FunctionWeight(touching_zero)])
-        for arc in (hm.simulate(block, 20.0), hm.simulate(compiled(block), 20.0)):
+        for arc in (hm.simulate(block, 20.0, engine=engine) for engine in ("python", "native")):
             assert arc["weights"].min() == 0.0
 
     @pytest.mark.parametrize("fmi", ["2.0", "3.0"])

@@ -1,0 +1,72 @@
+"""Compiled models that are used again: by the same automaton, and by others whose maps are the same.
+
+What the maps read besides their argument is compared at each use (`hybrid_model.native.free_values`), so a global, an
+attribute or an array that has changed meanwhile gives another model.
+"""
+
+from __future__ import annotations
+
+import threading
+import weakref
+from collections import OrderedDict
+from collections.abc import Callable
+
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.native.free_values.snapshots import Snapshot, current
+from hybrid_model.native.model_code import run_code
+from hybrid_model.native.networks.network import trace_any
+from hybrid_model.native.run import NativeModel
+
+MOST_MODELS = 256
+"""So many are kept, those that were used last."""
+
+_of_snapshots: weakref.WeakKeyDictionary[Snapshot, NativeModel] = weakref.WeakKeyDictionary()
+_by_key: OrderedDict[bytes, NativeModel] = OrderedDict()
+_lock = threading.Lock()
+
+
+def model_of(automaton: Automaton, check: Callable[[], None]) -> NativeModel:
+    """Return the compiled model of an automaton.
+
+    Parameters
+    ----------
+    automaton : Automaton
+        Whose maps.
+    check : callable
+        Called where the automaton has not been run before, or its maps may have changed.
+
+    Raises
+    ------
+    TraceError
+        If its maps cannot be traced.
+    BuildError
+        If there is no compiler, or it fails.
+    """
+    taken = current(automaton)
+    known = None if taken is None else _of_snapshots.get(taken)
+    if known is not None:
+        return known
+    check()
+    model = None if taken is None else _recent(taken.key)
+    if model is None:
+        traced = trace_any(automaton)
+        model = NativeModel(run_code(traced), [info.name for info in automaton.jumps])
+    # Maps that change what they read by being called are traced again each time.
+    if taken is not None and taken.still_holds():
+        _keep(taken, model)
+    return model
+
+
+def _recent(key: bytes) -> NativeModel | None:
+    with _lock:
+        if key in _by_key:
+            _by_key.move_to_end(key)
+        return _by_key.get(key)
+
+
+def _keep(taken: Snapshot, model: NativeModel) -> None:
+    with _lock:
+        _of_snapshots[taken] = model
+        _by_key[taken.key] = model
+        while len(_by_key) > MOST_MODELS:
+            _by_key.popitem(last=False)

@@ -1,0 +1,155 @@
+"""Runs of automata on the engine in C."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.signals import Inputs
+from hybrid_model.declare.variables import FloatArray, Kind
+from hybrid_model.errors import SimulationError, TraceError
+from hybrid_model.native.driven import Driven, drive
+from hybrid_model.native.kept_models import model_of
+from hybrid_model.native.model_code import run_code
+from hybrid_model.native.networks.network import NetworkTrace, trace_any
+from hybrid_model.native.run import Advance, Ending, NativeModel, NativeRun, Record
+from hybrid_model.record.arc_values import ComputedValues
+from hybrid_model.record.row_flows import RowFlows, RowJumps
+from hybrid_model.record.run_record import RunRecord
+from hybrid_model.scales import one_instant
+from hybrid_model.solver import Method, Solver
+from hybrid_model.stop import Stop
+from hybrid_model.zeno_guard import ZenoGuard
+
+STEPS_AT_ONCE = 20_000
+"""After so many steps a run comes back, so that it can be interrupted."""
+
+RAN = "native: its maps are compiled."
+
+_STOPS = {Ending.ZENO: Stop.ZENO, Ending.BLOCKED: Stop.BLOCKED, Ending.JUMPS: Stop.JUMPS}
+
+
+def native_run(
+    automaton: Automaton,
+    inputs: Inputs,
+    span: tuple[float, float],
+    solver: Solver,
+    zeno: ZenoGuard,
+    *,
+    events_only: bool,
+    check: Callable[[], None],
+) -> RunRecord:
+    """Run an automaton.
+
+    Parameters
+    ----------
+    automaton, inputs, solver, zeno
+        See `hybrid_model.simulate.simulate`.
+    span : (float, float)
+        Start and end in s.
+    events_only : bool
+        Whether to keep the jumps alone.
+    check : callable
+        Called before an automaton is traced; what it raises is raised.
+
+    Raises
+    ------
+    TraceError
+        If the native engine cannot run it: for what the maps do, the inputs are, or the solver wants.
+    BuildError
+        If there is no compiler, or it fails.
+    SimulationError
+        If the run cannot start or go on.
+    """
+    _require_options(solver)
+    model, driven = _driven_model(automaton, inputs, check) if inputs.vary else (model_of(automaton, check), None)
+    run = NativeRun(model)
+    _set_options(run, solver, zeno)
+    ended = _Driver(run, inputs, driven).run(span, Record.JUMPS if events_only else Record.ALL)
+    message = f"{automaton.name}: {run.message if ended else f'reached t = {span[1]:.9g} s.'}"
+    if ended and run.ending not in _STOPS:
+        raise SimulationError(message)
+    stop = _STOPS[run.ending] if ended else Stop.HORIZON
+    if stop is Stop.JUMPS:
+        message = f"{message} {stop.value}"
+    tolerance = solver.event_tolerance
+    rows = run.rows(events_only=events_only)
+    return RunRecord(
+        ComputedValues(automaton, inputs),
+        RowFlows(rows),
+        RowJumps(rows),
+        stop,
+        message,
+        one_instant(run.time, span[0], span[0]) if tolerance is None else tolerance,
+        engine=RAN,
+        statistics=run.statistics,
+    )
+
+
+class _Driver:
+    """Takes a run from breakpoint to breakpoint of its inputs."""
+
+    def __init__(self, run: NativeRun, inputs: Inputs, driven: Driven | None) -> None:
+        self._run, self._inputs, self._driven = run, inputs, driven
+
+    def run(self, span: tuple[float, float], record: Record) -> bool:
+        """Run from the start of a span to its end; return whether the run is over before."""
+        inputs, (start, end) = self._inputs, span
+        layout = inputs.layout
+        breakpoints = inputs.breakpoints_in(start, end)
+        u, p = self._outside(start, breakpoints[0] if breakpoints else end)
+        over = not self._run.start([layout.start(Kind.STATE), layout.start(Kind.DISCRETE), u, p], start, end, record)
+        for k, time in enumerate(breakpoints):
+            if over or self._goes_on_to(time, take=False):
+                return True
+            self._change(*self._outside(time, [*breakpoints[k + 1 :], end][0]))
+        return over or self._goes_on_to(end, take=True)
+
+    def _goes_on_to(self, time: float, *, take: bool) -> bool:
+        """Go on to a time; return whether the run is over."""
+        advance = Advance.PAUSED
+        while advance is Advance.PAUSED:
+            advance = self._run.advance(time, take=take)
+        return advance is Advance.ENDED
+
+    def _outside(self, a: float, b: float) -> tuple[FloatArray, FloatArray]:
+        """Return inputs and parameters on the piece from `a` to `b`, in s."""
+        extra = np.zeros(0) if self._driven is None else self._driven.coefficients(a, b)
+        return np.concatenate([self._inputs.held, extra]), self._inputs.parameters_at(a)
+
+    def _change(self, u: FloatArray, p: FloatArray) -> None:
+        for kind, values in ((Kind.INPUT, u), (Kind.PARAMETER, p)):
+            for index, value in enumerate(values):
+                self._run.set(kind, index, float(value))
+
+
+def _driven_model(automaton: Automaton, inputs: Inputs, check: Callable[[], None]) -> tuple[NativeModel, Driven]:
+    check()
+    traced = trace_any(automaton)
+    if isinstance(traced, NetworkTrace):
+        raise TraceError("inputs of a large network follow functions of time in Python only.")
+    driven = drive(traced, inputs)
+    return NativeModel(run_code(driven.trace), [info.name for info in automaton.jumps]), driven
+
+
+def _require_options(solver: Solver) -> None:
+    if solver.method not in (Method.DOP853, Method.RK45):
+        raise TraceError(f"the native engine does not step with {solver.stepper.__name__}.")
+    if solver.scan_points != Solver.scan_points:
+        raise TraceError(f"the native engine looks at {Solver.scan_points} points of a step: leave scan_points out.")
+
+
+def _set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard) -> None:
+    options = run.options
+    options.relative_tolerance = solver.rtol
+    options.absolute_tolerance = solver.atol or 0.0
+    options.longest_step = solver.max_step
+    options.event_tolerance = solver.event_tolerance or 0.0
+    options.jumps_at_once, options.jumps_in_window = zeno.jumps_at_once, zeno.jumps_in_window
+    options.spread = zeno.spread
+    options.window = -1.0 if zeno.window is None else zeno.window
+    options.remainder = -1.0 if zeno.remainder is None else zeno.remainder
+    options.most_jumps = zeno.max_jumps
+    options.steps_at_once, options.pauses = STEPS_AT_ONCE, 1.0

@@ -1,0 +1,134 @@
+"""Runs on the native engine: the same as in the Python engine; what runs where, and what is kept of a run."""
+
+import pickle
+
+import numpy as np
+import pytest
+from catalogue import cases
+from executions import reference, step_inputs
+
+import hybrid_model as hm
+from hybrid_model.declare.variables import Kind
+from hybrid_model.errors import SimulationError
+
+
+@pytest.mark.parametrize("name", list(cases()))
+def test_every_model_runs_alike(name):
+    case = cases()[name]
+    plain = reference(name)
+    fast = hm.simulate(case.automaton, case.t_end, inputs=step_inputs(case), engine="native")
+    assert [(jump.name, jump.j) for jump in fast.jumps] == [(jump.name, jump.j) for jump in plain.jumps]
+    # Two solvers at a relative tolerance of 1e-13, and rounding, magnified by what lies between two jumps.
+    close = 5e-9 if name == "stiff_thermostat" else 1e-9  # 20 degC, where the slowest margin moves by 1e-3 K/s
+    np.testing.assert_allclose([jump.t for jump in fast.jumps], [jump.t for jump in plain.jumps], rtol=0, atol=close)
+    assert fast.stop is plain.stop
+    assert fast.event_tolerance == pytest.approx(plain.event_tolerance)
+    times = np.linspace(0.0, min(fast.t[-1], plain.t[-1]), 101)
+    between = times[[not np.isclose(t, [jump.t for jump in plain.jumps], rtol=0, atol=2e-9).any() for t in times]]
+    for variable in case.automaton.of_kind(Kind.STATE, Kind.DISCRETE, Kind.OUTPUT):
+        np.testing.assert_allclose(fast.at(variable.name, between), plain.at(variable.name, between), atol=1e-9)
+
+
+def test_inputs_that_vary_and_a_copy_of_the_run():
+    """A driven integrator: x' = u(t) with u a sine and then a step; x in closed form."""
+
+    class Integrator(hm.HybridAutomaton):
+        x = hm.State(0.0)
+        u = hm.Input(0.0)
+
+        def flow_map(self, s):
+            return {"x": s.u}
+
+        def jump_set(self, s):
+            return s.x - 1.5
+
+        def jump_map(self, s):
+            return {"x": 0.0}
+
+    signal = hm.Signal(lambda t: np.sin(t) if t < np.pi else 1.0, [np.pi])
+    arc = hm.simulate(Integrator(), 5.0, inputs={"u": signal})
+    assert arc.engine.startswith("python: the signal given for input u is no polynomial")
+    first = np.arccos(-0.5)
+    # x(pi) = 0.5 after the jump, then slope one.
+    assert [jump.t for jump in arc.jumps] == pytest.approx([first, np.pi + 1.0], abs=1e-11)
+    assert arc.at("x", 4.5) == pytest.approx(4.5 - np.pi - 1.0, abs=1e-11)
+
+
+class Branching(hm.HybridAutomaton):
+    x = hm.State(0.5)
+
+    def flow_map(self, s):
+        return {"x": -1.0 if s.x > -10.0 else -2.0}
+
+
+def test_an_automaton_that_cannot_be_traced_runs_in_python_and_says_why():
+    arc = hm.simulate(Branching(), 1.0)
+    assert arc.at("x", 1.0) == pytest.approx(-0.5)
+    assert arc.statistics is None
+    assert arc.engine.startswith("python: flow_map of Branching cannot be traced: a condition on a traced value")
+    with pytest.raises(SimulationError, match=r"Branching cannot run on the native engine: .*np\.where"):
+        hm.simulate(Branching(), 1.0, engine="native")
+
+
+def test_what_ran_is_told():
+    ball = cases()["bouncing_ball"].automaton
+    assert hm.simulate(ball, 1.0).engine == "native: its maps are compiled."
+    assert hm.simulate(ball, 1.0, engine="python").engine == 'python: it was asked for (engine="python").'
+    with pytest.raises(SimulationError, match="engine = 'c': give one of 'auto', 'native', 'python'"):
+        hm.simulate(ball, 1.0, engine="c")
+
+
+@pytest.mark.parametrize(
+    "solver", [hm.Solver(method="Radau"), hm.Solver(method="LSODA"), hm.Solver(scan_points=16)], ids=str
+)
+def test_what_only_the_python_engine_can_do_it_does(solver):
+    arc = hm.simulate(cases()["bouncing_ball"].automaton, 1.0, solver=solver)
+    assert arc.engine.startswith("python: the native engine")
+
+
+def test_without_a_compiler_everything_runs_in_python(monkeypatch):
+    monkeypatch.setenv("CC", "no-such-compiler")
+
+    class Falling(hm.HybridAutomaton):
+        h = hm.State(1.0)
+
+        def flow_map(self, s):
+            return {"h": -s.t}
+
+    arc = hm.simulate(Falling(), 1.0)
+    assert arc.at("h", 1.0) == pytest.approx(0.5)
+    assert "no program 'no-such-compiler'" in arc.engine
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+def test_events_only(engine):
+    """Both sides of each jump and the end are kept, and a state between them is refused."""
+    ball = cases()["bouncing_ball"].automaton
+    whole, events = (hm.simulate(ball, 2.0, engine=engine, record=record) for record in ("all", "events"))
+    assert len(events.t) == 2 * (len(events.jumps) + 1)
+    np.testing.assert_array_equal(events.event_times("jump"), whole.event_times("jump"))
+    for one, other in zip(events.jumps, whole.jumps, strict=True):
+        np.testing.assert_array_equal(one.x_before, other.x_before)
+        assert events.before(one)["v"] == whole.before(other)["v"]
+    assert events.end["h"] == whole.end["h"]
+    assert events.t[-1] == 2.0
+    for read in (lambda: events.at("h", 0.1), lambda: events.resample([0.1]), lambda: events.restrict(t=(0.1, 1.0))):
+        with pytest.raises(hm.DeclarationError, match=r"kept its events only, and t = 0\.1 s lies between two of them"):
+            read()
+
+
+def test_what_a_run_costs_is_counted():
+    ball = cases()["bouncing_ball"].automaton
+    arc = hm.simulate(ball, 2.0, engine="native")
+    cost = arc.statistics
+    assert cost.jumps == len(arc.jumps)
+    assert cost.steps == sum(len(flow.pieces) for flow in arc._record.flows)
+    assert cost.evaluations > cost.steps
+    assert cost.probes > cost.jumps
+
+
+def test_a_run_and_its_parts_are_pickled():
+    arc = hm.simulate(cases()["bouncing_ball"].automaton, 2.0, engine="native")
+    again = pickle.loads(pickle.dumps(arc))
+    np.testing.assert_array_equal(again["h"], arc["h"])
+    assert again.at("h", 0.3) == arc.at("h", 0.3) == arc.restrict(t=(0.2, 0.4)).at("h", 0.3)
