@@ -12,10 +12,12 @@ from collections import OrderedDict
 from collections.abc import Callable
 
 from hybrid_model.declare.automaton import Automaton
+from hybrid_model.errors import DeclarationError, TraceError
 from hybrid_model.native.free_values.snapshots import Snapshot, current
 from hybrid_model.native.model_code import run_code
-from hybrid_model.native.networks.network import trace_any
+from hybrid_model.native.networks.network import NetworkTrace, trace_any
 from hybrid_model.native.run import NativeModel
+from hybrid_model.native.trace import Trace
 
 MOST_MODELS = 256
 """So many are kept, those that were used last."""
@@ -49,12 +51,25 @@ def model_of(automaton: Automaton, check: Callable[[], None]) -> NativeModel:
     check()
     model = None if taken is None else _recent(taken.key)
     if model is None:
-        traced = trace_any(automaton)
-        model = NativeModel(run_code(traced), [info.name for info in automaton.jumps])
+        model = NativeModel(run_code(traced_maps(automaton)), [info.name for info in automaton.jumps])
     # Maps that change what they read by being called are traced again each time.
     if taken is not None and taken.still_holds():
         _keep(taken, model)
     return model
+
+
+def traced_maps(automaton: Automaton) -> Trace | NetworkTrace:
+    """Return the maps of an automaton that has been checked.
+
+    Raises
+    ------
+    TraceError
+        If they cannot be traced; also for a slip in a map that the run may never call.
+    """
+    try:
+        return trace_any(automaton)
+    except DeclarationError as error:
+        raise TraceError(str(error)) from error
 
 
 def _recent(key: bytes) -> NativeModel | None:

@@ -11,9 +11,9 @@ from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import SimulationError, TraceError
 from hybrid_model.native.driven import Driven, drive
-from hybrid_model.native.kept_models import model_of
+from hybrid_model.native.kept_models import model_of, traced_maps
 from hybrid_model.native.model_code import run_code
-from hybrid_model.native.networks.network import NetworkTrace, trace_any
+from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.run import Advance, Ending, NativeModel, NativeRun, Record
 from hybrid_model.record.arc_values import ComputedValues
 from hybrid_model.record.row_flows import RowFlows, RowJumps
@@ -127,7 +127,7 @@ class _Driver:
 
 def _driven_model(automaton: Automaton, inputs: Inputs, check: Callable[[], None]) -> tuple[NativeModel, Driven]:
     check()
-    traced = trace_any(automaton)
+    traced = traced_maps(automaton)
     if isinstance(traced, NetworkTrace):
         raise TraceError("inputs of a large network follow functions of time in Python only.")
     driven = drive(traced, inputs)
