@@ -100,8 +100,8 @@ static bool ends_decide(const Shape *shape, const double *samples, Verdict *verd
            (shape->concave && !(begins_below && ends_below));
 }
 
-/* The shape of most margins, those that are nearly a parabola, quickly: `polynomial` would find the same.  A parabola has
-   three Bernstein coefficients, and its coefficients of degree eight lie between them, with differences of at least a
+/* The shape of most margins, those that are nearly a parabola, quickly: `polynomial` would find the same.  A parabola
+   has three Bernstein coefficients, and its coefficients of degree eight lie between them, with differences of at least a
    quarter of theirs and differences of those of a 28th of theirs.  What bends away from it changes them and the tail
    by less than the largest deviation of a sample times the factors above. */
 static Shape parabola(const double *samples)
