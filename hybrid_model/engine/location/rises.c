@@ -101,9 +101,9 @@ static bool ends_decide(const Shape *shape, const double *samples, Verdict *verd
 }
 
 /* The shape of most margins, those that are nearly a parabola, quickly: `polynomial` would find the same.  A parabola
-   has three Bernstein coefficients, and its coefficients of degree eight lie between them, with differences of at least a
-   quarter of theirs and differences of those of a 28th of theirs.  What bends away from it changes them and the tail
-   by less than the largest deviation of a sample times the factors above. */
+   has three Bernstein coefficients, and its coefficients of degree eight lie between them, with differences of at
+   least a quarter of theirs and differences of those of a 28th of theirs.  What bends away from it changes them and
+   the tail by less than the largest deviation of a sample times the factors above. */
 static Shape parabola(const double *samples)
 {
     double a = samples[0], b = samples[DEGREE], middle = 2.0 * samples[DEGREE / 2] - 0.5 * (a + b), bend = 0.0;
