@@ -27,6 +27,9 @@ class Automaton(ABC):
         Outputs that tick.
     priority : Priority
         What happens where flow set and jump set overlap.
+    stiff : bool, optional
+        Whether time scales of the flow differ so much that an explicit method would go by the fastest; None: found out
+        in the run.
     """
 
     name: str
@@ -34,6 +37,7 @@ class Automaton(ABC):
     jumps: tuple[JumpInfo, ...]
     clocks: tuple[ClockInfo, ...]
     priority: Priority
+    stiff: bool | None = None
 
     @property
     @abstractmethod

@@ -111,6 +111,10 @@ def _refuse_wrong_value(cls: type, name: str, value: object) -> None:
         raise DeclarationError(
             f"{cls.__name__}.priority is {told(value)}: write hm.Priority.JUMP (the default) or hm.Priority.FLOW."
         )
+    if name == "stiff" and not (value is None or isinstance(value, bool)):
+        raise DeclarationError(
+            f"{cls.__name__}.stiff is {told(value)}: write True, False, or nothing where the run is to find it out."
+        )
 
 
 def _refuse_misspelt(cls: type, name: str, value: object) -> None:

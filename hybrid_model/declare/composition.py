@@ -87,6 +87,7 @@ class Composition(Automaton):
         self._lay_out_variables()
         self._lay_out_jumps()
         self.priority = _common_priority(self)
+        self.stiff = _common_stiffness(self)
         self._refuse_loops()
 
     def _lay_out_variables(self) -> None:
@@ -422,3 +423,11 @@ def _common_priority(composition: Composition) -> Priority:
             "another leaves its flow set: give them jump priority, or let only one part of a composition jump on state."
         )
     return priorities.pop() if priorities else Priority.JUMP
+
+
+def _common_stiffness(composition: Composition) -> bool | None:
+    """Return True if a part is declared stiff, and False if all are declared not to be."""
+    declared = {automaton.stiff for automaton in composition.parts.values() if automaton.of_kind(Kind.STATE)}
+    if True in declared:
+        return True
+    return False if declared == {False} else None

@@ -35,7 +35,9 @@ class HybridAutomaton(Automaton):
 
     Subclasses write ``flow_map`` and, as needed, ``flow_set``, ``jump_set`` with ``jump_map`` (one jump, named
     ``"jump"``) or a tuple ``transitions`` of `Jump` and `TimeEvent`, ``start_map`` and ``outputs``.
-    Sets are margins: continuous functions that are zero or above inside.
+    Sets are margins: continuous functions that are zero or above inside. ``stiff = True`` asks for a method for stiff
+    flows from the start and ``stiff = False`` for none at all; otherwise the engine in C changes to it for good where a
+    flow shows itself to be stiff.
 
     Parameters
     ----------
@@ -53,7 +55,7 @@ class HybridAutomaton(Automaton):
     priority = Priority.JUMP
     transitions: ClassVar[tuple[Jump | TimeEvent, ...]] = ()
     written_by_authors: ClassVar[frozenset[str]] = frozenset(
-        {"flow_map", "flow_set", "start_map", "outputs", "transitions", "priority"}
+        {"flow_map", "flow_set", "start_map", "outputs", "transitions", "priority", "stiff"}
     )
     listed: ClassVar[Mapping[str, tuple[type, ...]]] = {"transitions": (Jump, TimeEvent)}
 

@@ -20,6 +20,7 @@ class Wrapper(Automaton):
         self.automaton = automaton
         self.name, self.variables = automaton.name, automaton.variables
         self.jumps, self.clocks, self.priority = automaton.jumps, automaton.clocks, automaton.priority
+        self.stiff = automaton.stiff
 
     def inner(self, s: Values) -> Values:
         """Return the values that the other automaton's maps are to see."""

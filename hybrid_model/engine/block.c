@@ -5,6 +5,9 @@
 
 #include "method.h"
 
+/* A full matrix of more rows costs more than it spares, unless the author wishes it. */
+#define MOST_STATES_TO_SHOW 100
+
 /* Hands out pieces of one allocation; without memory it only counts. */
 typedef struct {
     unsigned char *memory;
@@ -55,6 +58,28 @@ size_t engine_seed_count(const Model *m)
     return 1 + 3 * m->n_states + 2 * m->n_discrete + m->n_inputs + m->n_parameters + m->n_outputs;
 }
 
+bool engine_may_show_stiffness(const Model *m)
+{
+    return m->stiffness == STIFFNESS_UNKNOWN && m->n_states <= MOST_STATES_TO_SHOW;
+}
+
+/* What a method for stiff flows needs, where the model has derivatives for it. */
+static void lay_out_implicit(Engine *engine, Cursor *cursor)
+{
+    const Model *m = engine->model;
+    size_t n = m->n_states, vector = n * sizeof(double);
+    Implicit *of = &engine->implicit;
+    bool wanted = m->stiffness == STIFFNESS_DECLARED || engine_may_show_stiffness(m);
+    if (n == 0 || !(m->jacobian || (m->forward && wanted)))
+        return;
+    of->jacobian = take(cursor, n * vector);
+    of->matrix = take(cursor, n * vector);
+    of->drift = take(cursor, vector);
+    of->pivots = take(cursor, n * sizeof(size_t));
+    of->stages = take(cursor, STAGES_OF_RODAS * vector);
+    of->probe_stages = take(cursor, STAGES_OF_RODAS * vector);
+}
+
 static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
 {
     const Model *m = engine->model;
@@ -70,6 +95,7 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
         engine->probe_k[s] = take(&cursor, vector);
     }
     engine->step.vectors = take(&cursor, engine->method->n_vectors * vector);
+    lay_out_implicit(engine, &cursor);
     engine->probe_x = take(&cursor, vector);
     engine->dense_x = take(&cursor, vector);
     engine->margins = take(&cursor, rows * sizeof(double));
@@ -189,7 +215,8 @@ bool engine_block_is_sound(const Engine *engine, void *block)
         status->ending >= ENDED_NOT && status->ending <= ENDED_JUMPS && status->prediction >= PREDICTION_NONE &&
         status->prediction <= PREDICTION_STEP && memchr(status->message, '\0', sizeof status->message) != NULL &&
         isfinite(status->start_time) && status->floor >= 0.0 && isfinite(status->floor) && !isnan(status->stop_time) &&
-        isfinite(status->jumps_time) && isfinite(status->recent_time);
+        isfinite(status->jumps_time) && isfinite(status->recent_time) &&
+        (status->is_stiff == 0 || status->is_stiff == 1);
     for (size_t i = 0; i < N_RECENT; i++)
         sound = sound && status->recent[i] < (m->n_jumps > 0 ? m->n_jumps : 1);
     for (size_t j = 0; j < m->n_jumps; j++)

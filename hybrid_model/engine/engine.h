@@ -42,6 +42,7 @@ typedef struct {
     double steps_at_once;       /* of the solver in one engine_advance: more end the run, or pause it */
     double look_ahead_steps, look_ahead_work;   /* of a prediction; work is steps times states, margins and times */
     double pauses;              /* not 0: an advance that runs out of steps can be gone on with */
+    double stiff;               /* 1: the flow is; -1: it is not; 0: as declared, or as it shows itself */
 } EngineOptions;
 
 /* What engine_advance does with events. */
@@ -170,7 +171,7 @@ void engine_record(Engine *engine, RecordKind kind);
 const double *engine_rows(const Engine *engine, RowKind kind, size_t *count, size_t *width);
 /* What a run has cost since engine_reset.  Probes: states looked at between the ends of a step. */
 typedef struct {
-    uint64_t steps, rejected, evaluations, jumps, probes;
+    uint64_t steps, rejected, evaluations, jumps, probes, jacobians;
 } Statistics;
 const Statistics *engine_statistics(const Engine *engine);
 

@@ -14,6 +14,7 @@ bool engine_step_begin(Engine *engine, const Point *point)
     step->t0 = step->t1 = t;
     step->x0 = point->x;
     step->has_vectors = false;
+    engine_choose_method(engine);
     if (!engine_rates(engine, t, point->x, point->z, step->k[0]))
         return false;
     for (size_t i = 0; i < m->n_states; i++)
@@ -78,6 +79,7 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
             *point->step = next_step(method, h, used, error, rejected);
             step->has_vectors = false;
             engine->statistics.steps++;
+            engine_watch_stiffness(engine, point);
             return engine_gets_on(engine, point, limit);
         }
         h = used * (isfinite(error) ? fmax(0.1, 0.9 * pow(error, -1.0 / method->order)) : 0.1);
@@ -104,6 +106,7 @@ void engine_step_commit(Engine *engine, const Point *point)
     step->k[0] = last;
     step->t0 = step->t1;
     step->has_vectors = false;
+    engine_choose_method(engine);
 }
 
 bool engine_step_probe(Engine *engine, const Point *point, double t)

@@ -25,6 +25,9 @@ typedef int (*ModelFunction)(const double **arg, double **res, long long *iw, do
 /* The state after a jump: x+ (n_states), z+ (n_discrete). */
 typedef int (*ModelReset)(size_t jump, const double **arg, double **res, long long *iw, double *w);
 
+/* Whether time scales of the flow differ so much that an explicit method would go by the fastest. */
+typedef enum { STIFFNESS_UNKNOWN, STIFFNESS_DECLARED, STIFFNESS_DENIED } Stiffness;
+
 typedef enum { JUMP_ON_STATE, JUMP_ON_TIME } JumpKind;
 
 /* Names are two places in one text, of what comes up to the last dot and of the rest: large models have tens of
@@ -62,6 +65,7 @@ typedef struct {
     size_t n_arg, n_res, n_iw, n_w;    /* sizes of the work arrays that the functions need (maximum over all) */
     bool flow_priority;                /* flow wins where flow set and jump set overlap (default: jump) */
     bool has_flow_set;                 /* false: flow is allowed everywhere */
+    Stiffness stiffness;
     bool predictable;                  /* all inputs discrete: the next event follows from the state */
     const double *x, *z, *u, *p;       /* start values; NULL where whoever runs the model has them */
     const double *nominals;            /* a usual size of each continuous state, 0 if none is declared */
@@ -79,6 +83,8 @@ typedef struct {
        reverse: weights of dx/dt, y -> sensitivities to t, x, z, u, p
        start_forward, start_reverse: the same of x0, z0 in place of dx/dt, y */
     ModelFunction forward, reverse, start_forward, start_reverse;
+    /* -> d(dx/dt)/dx (n_states^2, by columns), d(dx/dt)/dt (n_states); NULL where `forward` is to do. */
+    ModelFunction jacobian;
     const ModelJump *jumps;            /* in the fixed order in which simultaneous ones are taken */
     const ModelName *state_names, *discrete_names, *margin_names;
     const char *names;                 /* heads and tails one after the other, each with its end */

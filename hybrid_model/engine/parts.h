@@ -102,8 +102,22 @@ typedef struct {
     int32_t settled;              /* nothing has changed from outside since the last advance */
     int32_t prediction;
     int32_t ending;
+    /* What the steps of an explicit method show of stiffness: see stiffness.c. */
+    int32_t is_stiff;
+    uint32_t steps_to_look, signs_of_stiffness, signs_against;
     char message[MESSAGE_SIZE];
 } Status;
+
+/* What a method for stiff flows works with: matrices by columns, n_states by n_states. */
+typedef struct {
+    double *jacobian;             /* d(rates)/d(states) at the start of the present step */
+    double *drift;                /* d(rates)/dt there */
+    bool has_jacobian;
+    double *matrix;               /* factors of I/(gamma h) - jacobian */
+    size_t *pivots;
+    double factorized_for;        /* that h, 0 for none */
+    double *stages, *probe_stages;
+} Implicit;
 
 typedef struct {
     double *values;
@@ -132,6 +146,7 @@ struct Engine {
     long long *iw;
     double *w;
     Step step;
+    Implicit implicit;            /* without places where no method for stiff flows may be needed */
     double *probe_k[N_STAGES], *probe_x, *dense_x;
     double *margins, *enabled, *times, *samples;
     double *outputs, *rates, *indicators;   /* of the view */
@@ -185,6 +200,8 @@ void engine_segment_move(Engine *engine, double t);
 void engine_catch_up(Engine *engine);
 
 /* block.c */
+/* Whether the flow may turn out to be stiff in a run. */
+bool engine_may_show_stiffness(const Model *model);
 void engine_copy(double *to, const double *from, size_t n);
 void engine_copy_point(const Engine *engine, const Point *from, const Point *to);
 /* The number of seeds in one of the engine's two places for them. */
@@ -232,6 +249,13 @@ bool engine_gets_on(Engine *engine, const Point *point, double limit);
 bool engine_too_small(Engine *engine, const Point *point, double h);
 /* The pace of a flow is counted from the point on. */
 void engine_begin_pace(const Point *point);
+
+/* stiffness.c */
+/* Takes the method for stiff flows, or the other one, for the steps from now on. */
+void engine_choose_method(Engine *engine);
+/* Looks at an accepted step for what makes a flow stiff.  Where the method is about to change, or the steps of one for
+   stiff flows grow, their pace so far says nothing and is counted anew. */
+void engine_watch_stiffness(Engine *engine, const Point *point);
 
 /* integrate.c */
 /* Evaluates the flow at the point into step->k[0]. */

@@ -2,7 +2,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "parts.h"
+#include "method.h"
 
 double engine_state_size(const Engine *engine, const Point *point, size_t i, double x)
 {
@@ -24,13 +24,14 @@ double engine_error_scale(const Engine *engine, const Point *point, size_t i, do
 {
     const EngineOptions *options = &engine->options;
     const ModelScales *scales = &engine->model->scales;
-    double nominal = engine->model->nominals[i], looser = options->relative_tolerance / RELATIVE_TOLERANCE;
+    double relative = fmax(options->relative_tolerance, engine->method->finest_tolerance);
+    double nominal = engine->model->nominals[i], looser = relative / RELATIVE_TOLERANCE;
     if (options->absolute_tolerance > 0.0)
-        return options->absolute_tolerance + options->relative_tolerance * size;
+        return options->absolute_tolerance + relative * size;
     double shown = fmax(engine->status->floor, fmax(point->size[i], size)) / engine->largest;
     double usual = engine->largest * (shown < scales->rounding_level ? 1.0 : sqrt(shown));
     double part = scales->absolute * looser * (nominal > 0.0 ? nominal : fmin(usual, 1.0));
-    return part + options->relative_tolerance * size;
+    return part + relative * size;
 }
 
 void engine_note_sizes(const Engine *engine, const Point *point)

@@ -32,6 +32,7 @@ from hybrid_model.models.switched_feedback import NormSwitch, StaticFeedback, Sw
 from hybrid_model.models.thermostat import Thermostat
 from hybrid_model.models.two_gene_network import TwoGeneNetwork
 from hybrid_model.models.two_tank import TwoTank
+from hybrid_model.models.van_der_pol import VanDerPol
 from hybrid_model.models.vehicle_on_path import VehicleOnPath
 
 __all__ = [
@@ -76,6 +77,7 @@ __all__ = [
     "Thermostat",
     "TwoGeneNetwork",
     "TwoTank",
+    "VanDerPol",
     "VehicleOnPath",
     "ZeroOrderHold",
 ]

@@ -36,6 +36,26 @@ def derivative_functions(traced: Trace) -> dict[str, ca.Function]:
     }
 
 
+def jacobian_function(traced: Trace) -> ca.Function:
+    """Return the derivatives of the flow map that methods for stiff flows need.
+
+    Parameters
+    ----------
+    traced : Trace
+        The automaton.
+
+    Returns
+    -------
+    casadi.Function
+        t, x, z, u, p -> d(dx/dt)/dx (dense), d(dx/dt)/dt.
+    """
+    arguments = traced.flow.sx_in()
+    (rates,) = traced.flow.call(arguments)
+    time, states = (arguments[ARGUMENTS.index(name)] for name in ("t", "x"))
+    slopes = [ca.densify(ca.jacobian(rates, argument)) for argument in (states, time)]
+    return ca.Function("hybrid_jacobian", arguments, slopes)
+
+
 def _forward(name: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
     seeds = [ca.SX.sym(f"{name}_seed", argument.numel()) for argument in arguments]
     changes = [ca.jtimes(result, ca.vertcat(*arguments), ca.vertcat(*seeds)) for result in results]

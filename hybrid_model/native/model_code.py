@@ -9,7 +9,7 @@ from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.transitions import Priority, Trigger
 from hybrid_model.declare.variables import Kind
 from hybrid_model.native.c_text import array, boolean, constant, definition, functions, row, string
-from hybrid_model.native.derivatives import derivative_functions
+from hybrid_model.native.derivatives import derivative_functions, jacobian_function
 from hybrid_model.native.names import NameTable
 from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.trace import Trace
@@ -28,12 +28,12 @@ def model_code(traced: Trace | NetworkTrace) -> str:
     str
         A C99 translation unit that defines ``const Model model``.
     """
-    maps, work = _maps(traced, derivatives=True)
+    maps, work = _maps(traced, derivatives=True, jacobian=traced.automaton.stiff is True)
     model = _model(traced, work, traced.automaton.name, starts=True)
     return "\n".join([_PRELUDE, maps, *_tables(traced, starts=True), model])
 
 
-def run_code(traced: Trace | NetworkTrace) -> str:
+def run_code(traced: Trace | NetworkTrace, *, jacobian: bool = False) -> str:
     """Return the C source of a model that is run in this process, after hybrid_model/engine/runs/exports.c.
 
     Start values and the instance's name are not in it, since whoever runs it has them, so that instances that differ in
@@ -43,32 +43,38 @@ def run_code(traced: Trace | NetworkTrace) -> str:
     ----------
     traced : Trace or NetworkTrace
         The automaton's maps.
+    jacobian : bool
+        Whether the run is to have a method for stiff flows; an automaton that is declared stiff has it.
 
     Returns
     -------
     str
         A C99 translation unit that defines ``const Model model``, for `hybrid_model.native.build.libraries`.
     """
-    maps, work = _maps(traced, derivatives=False)
+    maps, work = _maps(traced, derivatives=False, jacobian=jacobian or traced.automaton.stiff is True)
     model = _model(traced, work, type(traced.automaton).__name__, starts=False)
     return "\n".join([_PRELUDE, maps, *_tables(traced, starts=False), model])
 
 
-def _maps(traced: Trace | NetworkTrace, *, derivatives: bool) -> tuple[str, Sequence[int]]:
+def _maps(traced: Trace | NetworkTrace, *, derivatives: bool, jacobian: bool) -> tuple[str, Sequence[int]]:
     """Return the definitions of the maps and of their derivatives, and the sizes of the work arrays they need."""
     if isinstance(traced, NetworkTrace):
-        return traced.c_code(), traced.work_sizes
-    given = [*traced.functions, *(derivative_functions(traced).values() if derivatives else ())]
+        return "\n".join([traced.c_code(), _NO_JACOBIAN]), traced.work_sizes
+    found = {**(derivative_functions(traced) if derivatives else {})}
+    if jacobian:
+        found["jacobian"] = jacobian_function(traced)
+    given = [*traced.functions, *found.values()]
     resets = array("ModelFunction", "resets", (reset.name() for reset in traced.resets))
-    without = [] if derivatives else [_NO_DERIVATIVES]
+    without = [f"#define hybrid_{name} NULL" for name in _DERIVATIVES if name not in found]
     code = "\n".join([functions("model", given), '#include "model.h"', "", resets, _RESET, *without])
     return code, [max(getattr(f, size)() for f in given) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
 
 
-_MAPS = (
-    *("start", "flow", "flow_set", "margins", "times", "outputs", "reset"),
-    *("forward", "reverse", "start_forward", "start_reverse"),
-)
+_DERIVATIVES = ("forward", "reverse", "start_forward", "start_reverse", "jacobian")
+_MAPS = ("start", "flow", "flow_set", "margins", "times", "outputs", "reset", *_DERIVATIVES)
+_NO_JACOBIAN = "#define hybrid_jacobian NULL\n"
+"""Of networks, whose parts have derivatives along directions each."""
+_STIFFNESS = {None: "STIFFNESS_UNKNOWN", True: "STIFFNESS_DECLARED", False: "STIFFNESS_DENIED"}
 _VECTORS = {"x": Kind.STATE, "z": Kind.DISCRETE, "u": Kind.INPUT, "p": Kind.PARAMETER}
 _PRELUDE = """\
 /* Generated from an automaton.  Its names stay inside, and its maps need not use all that they are given. */
@@ -84,7 +90,6 @@ static int hybrid_reset(size_t jump, const double **arg, double **res, long long
     return resets[jump](arg, res, iw, w, 0);
 }
 """
-_NO_DERIVATIVES = "\n".join(f"#define hybrid_{name} NULL" for name in _MAPS[-4:])
 
 
 def _tables(traced: Trace | NetworkTrace, *, starts: bool) -> list[str]:
@@ -138,6 +143,7 @@ def _model(traced: Trace | NetworkTrace, work: Sequence[int], name: str, *, star
         **dict(zip(("n_arg", "n_res", "n_iw", "n_w"), work, strict=True)),
         "flow_priority": boolean(automaton.priority is Priority.FLOW),
         "has_flow_set": boolean(automaton.has_flow_set),
+        "stiffness": _STIFFNESS[automaton.stiff],
         "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" if starts else "NULL" for name in _VECTORS},
         **{name: f"hybrid_{name}" for name in _MAPS},

@@ -36,8 +36,9 @@ def cases():
         "resting_ball": Case(hm.models.RestingBall(slowest=0.3), 3.0),
         "bouncing_ball_with_dwell": Case(hm.MinimumDwell(hm.models.BouncingBall(), 0.05), 3.0),
         "thermostat": Case(hm.models.Thermostat(), 150.0),
-        # Not stiff: the FMU integrates with an explicit method.
+        # Not stiff, for the sake of the engine in Python.
         "stiff_thermostat": Case(hm.models.StiffThermostat(sensor_lag=0.5), 40.0),
+        "van_der_pol": Case(hm.models.VanDerPol(damping=5.0), 30.0),
         "integrator": Case(
             consensus.Integrator(degree=2, x=1.0, weights=[1.0, 0.5]),
             4.0,

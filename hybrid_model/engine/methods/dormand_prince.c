@@ -111,6 +111,24 @@ static void prepare(Engine *engine)
     }
 }
 
+/* |h lambda| for the eigenvalue of the Jacobian that shows in the last two stages, both of which are at the end of the
+   step: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II", section IV.2. */
+static double stiffness(const Engine *engine, const Point *point)
+{
+    const Step *step = &engine->step;
+    double rates = 0.0, states = 0.0;
+    for (size_t i = 0; i < engine->model->n_states; i++) {
+        double between = 0.0, size = fmax(fabs(step->x0[i]), fabs(step->x1[i]));
+        for (size_t s = 0; s < N_STAGES - 1; s++)
+            between += (TABLE[N_STAGES - 1][s] - TABLE[N_STAGES - 2][s]) * step->k[s][i];
+        double scale = engine_error_scale(engine, point, i, size);
+        double change = (step->k[N_STAGES - 1][i] - step->k[N_STAGES - 2][i]) / scale;
+        rates += change * change;
+        states += between / scale * (between / scale);
+    }
+    return states > 0.0 ? sqrt(rates / states) : 0.0;
+}
+
 const Method engine_dormand_prince = {
     .n_vectors = NESTED_VECTORS,
     .order = 5.0,
@@ -119,4 +137,5 @@ const Method engine_dormand_prince = {
     .prepare = prepare,
     .interpolate = engine_interpolate_nested,
     .straight = engine_straight_nested,
+    .stiffness = stiffness,
 };
