@@ -253,8 +253,8 @@ void engine_begin_pace(const Point *point);
 /* stiffness.c */
 /* Takes the method for stiff flows, or the other one, for the steps from now on. */
 void engine_choose_method(Engine *engine);
-/* Looks at an accepted step for what makes a flow stiff.  Where the method is about to change, or the steps of one for
-   stiff flows grow, their pace so far says nothing and is counted anew. */
+/* Looks at an accepted step for what makes a flow stiff.  Where the method is about to change, and where it is one for
+   stiff flows, whose steps differ by orders of magnitude, the pace so far says nothing: no flow creeps. */
 void engine_watch_stiffness(Engine *engine, const Point *point);
 
 /* integrate.c */

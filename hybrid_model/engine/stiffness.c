@@ -9,8 +9,6 @@
 #define AT_BORDER 1.5
 /* Twice before a run is given up for its pace, see PACE_STEPS in hybrid_model/scales.py. */
 #define STEPS_BETWEEN_LOOKS 1000
-/* A step so many times longer than the average since the pace is counted: the flow slows down. */
-#define GROWN 1.25
 #define SIGNS 15
 #define SIGNS_AGAINST 6
 
@@ -44,15 +42,8 @@ static bool signs_of_stiffness(Engine *engine, const Point *point)
     return status->signs_of_stiffness > 0 && engine->implicit.jacobian;
 }
 
-static bool steps_grow(const Engine *engine, const Point *point)
-{
-    const Step *step = &engine->step;
-    double steps = point->progress[PACE_STEPS], time = step->t1 - point->progress[PACE_BEGIN];
-    return steps * (step->t1 - step->t0) > GROWN * time;
-}
-
 void engine_watch_stiffness(Engine *engine, const Point *point)
 {
-    if (engine->method->stiffness ? signs_of_stiffness(engine, point) : steps_grow(engine, point))
+    if (!engine->method->stiffness || signs_of_stiffness(engine, point))
         engine_begin_pace(point);
 }
