@@ -36,7 +36,7 @@ class HybridAutomaton(Automaton):
     Subclasses write ``flow_map`` and, as needed, ``flow_set``, ``jump_set`` with ``jump_map`` (one jump, named
     ``"jump"``) or a tuple ``transitions`` of `Jump` and `TimeEvent`, ``start_map`` and ``outputs``.
     Sets are margins: continuous functions that are zero or above inside. ``stiff = True`` asks for a method for stiff
-    flows from the start and ``stiff = False`` for none at all; otherwise the engine in C changes to it for good where a
+    flows from the start and ``stiff = False`` for none at all; otherwise an FMU changes to it for good where a
     flow shows itself to be stiff.
 
     Parameters
