@@ -14,7 +14,7 @@ from hybrid_model.native.build.libraries import MODEL_SYMBOL, engine_library, mo
 from hybrid_model.record.row_flows import Rows
 from hybrid_model.record.run_record import RunStatistics
 
-_INTERFACE = 3
+_INTERFACE = 2
 """Of `run_interface` in exports.c."""
 
 _KINDS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
@@ -29,12 +29,12 @@ class Options(ctypes.Structure):
         for name in (
             *("relative_tolerance", "absolute_tolerance", "longest_step", "barrier", "event_tolerance"),
             *("jumps_at_once", "jumps_in_window", "spread", "window", "remainder", "most_jumps"),
-            *("steps_at_once", "look_ahead_steps", "look_ahead_work", "pauses", "stiff"),
+            *("steps_at_once", "look_ahead_steps", "look_ahead_work", "pauses"),
         )
     ]
 
 
-_COUNTS = ("steps", "rejected", "evaluations", "jumps", "probes", "jacobians")
+_COUNTS = ("steps", "rejected", "evaluations", "jumps", "probes")
 
 
 class _Statistics(ctypes.Structure):
@@ -85,7 +85,6 @@ def _engine() -> ctypes.CDLL:
         "run_rows": (ctypes.c_void_p, [engine, ctypes.c_int, count, count]),
         "run_statistics": (ctypes.POINTER(_Statistics), [engine]),
         "run_ending": (ctypes.c_int, [engine]),
-        "run_shows_stiffness": (ctypes.c_int, [engine]),
         "run_time": (number, [engine]),
         "run_message": (ctypes.c_char_p, [engine]),
         "run_free": (None, [engine]),
@@ -107,8 +106,6 @@ class NativeModel:
         Its C code, see `hybrid_model.native.model_code.run_code`.
     jumps : sequence of str
         Names of its jumps.
-    stiff : bool
-        Whether it has what a method for stiff flows needs.
 
     Raises
     ------
@@ -116,8 +113,8 @@ class NativeModel:
         If there is no compiler, or it fails.
     """
 
-    def __init__(self, source: str, jumps: Sequence[str], *, stiff: bool) -> None:
-        self.jumps, self.stiff = tuple(jumps), stiff
+    def __init__(self, source: str, jumps: Sequence[str]) -> None:
+        self.jumps = tuple(jumps)
         self._library = ctypes.CDLL(str(model_library(source)))
         address = getattr(self._library, MODEL_SYMBOL)
         address.restype = ctypes.c_void_p
@@ -140,7 +137,7 @@ class NativeRun:
     """
 
     def __init__(self, model: NativeModel) -> None:
-        self.model, self._library = model, _engine()
+        self._model, self._library = model, _engine()
         self._states = self._discrete = 0
         self._engine = self._library.run_create(model.pointer)
         if not self._engine:
@@ -179,11 +176,6 @@ class NativeRun:
         return float(self._library.run_time(self._engine))
 
     @property
-    def shows_stiffness(self) -> bool:
-        """Whether the steps of an explicit method have shown that the flow is stiff."""
-        return bool(self._library.run_shows_stiffness(self._engine))
-
-    @property
     def ending(self) -> Ending:
         """Why the run is over."""
         return Ending(self._library.run_ending(self._engine))
@@ -201,7 +193,7 @@ class NativeRun:
 
     def rows(self, *, events_only: bool) -> Rows:
         """Return a copy of what has been recorded: all, or the jumps alone."""
-        jumps, names = self._rows(1), self.model.jumps
+        jumps, names = self._rows(1), self._model.jumps
         if events_only:
             reached = _copied(self._library.run_values(self._engine, 0), (self._states,))
             return Rows.of_events(jumps, self.time, reached, self._discrete, names)

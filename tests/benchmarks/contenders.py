@@ -57,9 +57,7 @@ CONTENDERS = (
     Contender("sksundae loop, CVODE Adams", "with_cvode", needs="sksundae", tolerances=_DECADE_MORE),
     Contender("pathsim, RKDP87", "with_pathsim", needs="pathsim", tolerances=_DECADE_MORE),
     Contender("hybrid-fmu, `simulate`", "with_hybrid_fmu", "simulate"),
-    Contender(
-        "hybrid-fmu, `simulate(compiled)`", "with_hybrid_fmu", "simulate_compiled", needs="hybrid_model.native.compiled"
-    ),
+    Contender('hybrid-fmu, `simulate(engine="python")`', "with_hybrid_fmu", "simulate_python"),
     # The FMUs integrate with the tolerance that they were built with.
     Contender("hybrid-fmu, FMUs event-exact", "with_hybrid_fmu", "co_simulate", tolerances=(1e-13,)),
 )

@@ -1,4 +1,4 @@
-"""This project: `simulate` on the automaton, on the compiled automaton, and FMUs under the event-exact master."""
+"""This project: `simulate` on the engine in C and on the one in Python, and FMUs under the event-exact master."""
 
 import tempfile
 from pathlib import Path
