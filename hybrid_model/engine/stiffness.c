@@ -6,7 +6,7 @@
 
 /* In units of the fastest time scale Dormand-Prince 5(4) is stable up to 3.3, and the control of its steps keeps them
    somewhat below; where accuracy decides about them, at tolerances of 1e-10 and less, they are below 0.1. */
-#define AT_BORDER 1.5
+#define AT_BORDER 1.0
 /* Twice before a run is given up for its pace, see PACE_STEPS in hybrid_model/scales.py. */
 #define STEPS_BETWEEN_LOOKS 1000
 #define SIGNS 15

@@ -27,7 +27,7 @@ _by_key: OrderedDict[bytes, NativeModel] = OrderedDict()
 _lock = threading.Lock()
 
 
-def model_of(automaton: Automaton, check: Callable[[], None]) -> NativeModel:
+def model_of(automaton: Automaton, check: Callable[[], None], *, stiff: bool = False) -> NativeModel:
     """Return the compiled model of an automaton.
 
     Parameters
@@ -36,6 +36,9 @@ def model_of(automaton: Automaton, check: Callable[[], None]) -> NativeModel:
         Whose maps.
     check : callable
         Called where the automaton has not been run before, or its maps may have changed.
+    stiff : bool
+        Whether the model must have what a method for stiff flows needs; one that has it is kept in place of one that
+        has not.
 
     Raises
     ------
@@ -46,16 +49,23 @@ def model_of(automaton: Automaton, check: Callable[[], None]) -> NativeModel:
     """
     taken = current(automaton)
     known = None if taken is None else _of_snapshots.get(taken)
-    if known is not None:
+    if known is not None and known.stiff >= stiff:
         return known
     check()
     model = None if taken is None else _recent(taken.key)
-    if model is None:
-        model = NativeModel(run_code(traced_maps(automaton)), [info.name for info in automaton.jumps])
+    if model is None or model.stiff < stiff:
+        model = made_model(automaton, traced_maps(automaton), stiff=stiff)
     # Maps that change what they read by being called are traced again each time.
     if taken is not None and taken.still_holds():
         _keep(taken, model)
     return model
+
+
+def made_model(automaton: Automaton, traced: Trace | NetworkTrace, *, stiff: bool) -> NativeModel:
+    """Compile traced maps of an automaton."""
+    stiff = stiff or automaton.stiff is True
+    source = run_code(traced, jacobian=stiff)
+    return NativeModel(source, [info.name for info in automaton.jumps], stiff=stiff)
 
 
 def traced_maps(automaton: Automaton) -> Trace | NetworkTrace:

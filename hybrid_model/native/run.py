@@ -14,7 +14,7 @@ from hybrid_model.native.build.libraries import MODEL_SYMBOL, engine_library, mo
 from hybrid_model.record.row_flows import Rows
 from hybrid_model.record.run_record import RunStatistics
 
-_INTERFACE = 2
+_INTERFACE = 3
 """Of `run_interface` in exports.c."""
 
 _KINDS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
@@ -29,12 +29,12 @@ class Options(ctypes.Structure):
         for name in (
             *("relative_tolerance", "absolute_tolerance", "longest_step", "barrier", "event_tolerance"),
             *("jumps_at_once", "jumps_in_window", "spread", "window", "remainder", "most_jumps"),
-            *("steps_at_once", "look_ahead_steps", "look_ahead_work", "pauses"),
+            *("steps_at_once", "look_ahead_steps", "look_ahead_work", "pauses", "stiff"),
         )
     ]
 
 
-_COUNTS = ("steps", "rejected", "evaluations", "jumps", "probes")
+_COUNTS = ("steps", "rejected", "evaluations", "jumps", "probes", "jacobians")
 
 
 class _Statistics(ctypes.Structure):
@@ -85,6 +85,7 @@ def _engine() -> ctypes.CDLL:
         "run_rows": (ctypes.c_void_p, [engine, ctypes.c_int, count, count]),
         "run_statistics": (ctypes.POINTER(_Statistics), [engine]),
         "run_ending": (ctypes.c_int, [engine]),
+        "run_shows_stiffness": (ctypes.c_int, [engine]),
         "run_time": (number, [engine]),
         "run_message": (ctypes.c_char_p, [engine]),
         "run_free": (None, [engine]),
@@ -106,6 +107,8 @@ class NativeModel:
         Its C code, see `hybrid_model.native.model_code.run_code`.
     jumps : sequence of str
         Names of its jumps.
+    stiff : bool
+        Whether it has what a method for stiff flows needs.
 
     Raises
     ------
@@ -113,8 +116,8 @@ class NativeModel:
         If there is no compiler, or it fails.
     """
 
-    def __init__(self, source: str, jumps: Sequence[str]) -> None:
-        self.jumps = tuple(jumps)
+    def __init__(self, source: str, jumps: Sequence[str], *, stiff: bool) -> None:
+        self.jumps, self.stiff = tuple(jumps), stiff
         self._library = ctypes.CDLL(str(model_library(source)))
         address = getattr(self._library, MODEL_SYMBOL)
         address.restype = ctypes.c_void_p
@@ -137,7 +140,7 @@ class NativeRun:
     """
 
     def __init__(self, model: NativeModel) -> None:
-        self._model, self._library = model, _engine()
+        self.model, self._library = model, _engine()
         self._states = self._discrete = 0
         self._engine = self._library.run_create(model.pointer)
         if not self._engine:
@@ -176,6 +179,11 @@ class NativeRun:
         return float(self._library.run_time(self._engine))
 
     @property
+    def shows_stiffness(self) -> bool:
+        """Whether the steps of an explicit method have shown that the flow is stiff."""
+        return bool(self._library.run_shows_stiffness(self._engine))
+
+    @property
     def ending(self) -> Ending:
         """Why the run is over."""
         return Ending(self._library.run_ending(self._engine))
@@ -193,7 +201,7 @@ class NativeRun:
 
     def rows(self, *, events_only: bool) -> Rows:
         """Return a copy of what has been recorded: all, or the jumps alone."""
-        jumps, names = self._rows(1), self._model.jumps
+        jumps, names = self._rows(1), self.model.jumps
         if events_only:
             reached = _copied(self._library.run_values(self._engine, 0), (self._states,))
             return Rows.of_events(jumps, self.time, reached, self._discrete, names)

@@ -11,8 +11,7 @@ from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import SimulationError, TraceError
 from hybrid_model.native.driven import Driven, drive
-from hybrid_model.native.kept_models import model_of, traced_maps
-from hybrid_model.native.model_code import run_code
+from hybrid_model.native.kept_models import made_model, model_of, traced_maps
 from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.run import Advance, Ending, NativeModel, NativeRun, Record
 from hybrid_model.record.arc_values import ComputedValues
@@ -28,6 +27,7 @@ STEPS_AT_ONCE = 20_000
 
 RAN = "native: its maps are compiled."
 
+_FOR_STIFF_FLOWS = (Method.RADAU, Method.BDF)
 _STOPS = {Ending.ZENO: Stop.ZENO, Ending.BLOCKED: Stop.BLOCKED, Ending.JUMPS: Stop.JUMPS}
 
 
@@ -64,10 +64,19 @@ def native_run(
         If the run cannot start or go on.
     """
     _require_options(solver)
-    model, driven = _driven_model(automaton, inputs, check) if inputs.vary else (model_of(automaton, check), None)
-    run = NativeRun(model)
-    _set_options(run, solver, zeno)
-    ended = _Driver(run, inputs, driven).run(span, Record.JUMPS if events_only else Record.ALL)
+    record, stiff = Record.JUMPS if events_only else Record.ALL, solver.method in _FOR_STIFF_FLOWS
+    for again in (False, True):
+        if inputs.vary:
+            model, driven = _driven_model(automaton, inputs, check, stiff=stiff)
+        else:
+            model, driven = model_of(automaton, check, stiff=stiff), None
+        run = NativeRun(model)
+        _set_options(run, solver, zeno)
+        ended = _Driver(run, inputs, driven).run(span, record)
+        # From the start, with the derivatives that another method needs: so the first run is as all later ones.
+        stiff = run.shows_stiffness
+        if model.stiff or not stiff or again:
+            break
     message = f"{automaton.name}: {run.message if ended else f'reached t = {span[1]:.9g} s.'}"
     if ended and run.ending not in _STOPS:
         raise SimulationError(message)
@@ -110,9 +119,9 @@ class _Driver:
     def _goes_on_to(self, time: float, *, take: bool) -> bool:
         """Go on to a time; return whether the run is over."""
         advance = Advance.PAUSED
-        while advance is Advance.PAUSED:
+        while advance is Advance.PAUSED and not (self._run.shows_stiffness and not self._run.model.stiff):
             advance = self._run.advance(time, take=take)
-        return advance is Advance.ENDED
+        return advance in (Advance.ENDED, Advance.PAUSED)
 
     def _outside(self, a: float, b: float) -> tuple[FloatArray, FloatArray]:
         """Return inputs and parameters on the piece from `a` to `b`, in s."""
@@ -125,17 +134,19 @@ class _Driver:
                 self._run.set(kind, index, float(value))
 
 
-def _driven_model(automaton: Automaton, inputs: Inputs, check: Callable[[], None]) -> tuple[NativeModel, Driven]:
+def _driven_model(
+    automaton: Automaton, inputs: Inputs, check: Callable[[], None], *, stiff: bool
+) -> tuple[NativeModel, Driven]:
     check()
     traced = traced_maps(automaton)
     if isinstance(traced, NetworkTrace):
         raise TraceError("inputs of a large network follow functions of time in Python only.")
     driven = drive(traced, inputs)
-    return NativeModel(run_code(driven.trace), [info.name for info in automaton.jumps]), driven
+    return made_model(automaton, driven.trace, stiff=stiff), driven
 
 
 def _require_options(solver: Solver) -> None:
-    if solver.method not in (Method.DOP853, Method.RK45):
+    if solver.method not in (Method.DOP853, Method.RK45, *_FOR_STIFF_FLOWS):
         raise TraceError(f"the native engine does not step with {solver.stepper.__name__}.")
     if solver.scan_points != Solver.scan_points:
         raise TraceError(f"the native engine looks at {Solver.scan_points} points of a step: leave scan_points out.")
@@ -153,3 +164,4 @@ def _set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard) -> None:
     options.remainder = -1.0 if zeno.remainder is None else zeno.remainder
     options.most_jumps = zeno.max_jumps
     options.steps_at_once, options.pauses = STEPS_AT_ONCE, 1.0
+    options.stiff = float(solver.method in _FOR_STIFF_FLOWS)

@@ -25,6 +25,8 @@ class RunStatistics:
         Breakpoints of the flow included.
     probes : int
         States looked at between the ends of a step, to locate events.
+    jacobians : int
+        Derivatives of the flow, where a method for stiff flows stepped.
     """
 
     steps: int
@@ -32,6 +34,7 @@ class RunStatistics:
     evaluations: int
     jumps: int
     probes: int
+    jacobians: int
 
 
 @dataclass(frozen=True, eq=False)

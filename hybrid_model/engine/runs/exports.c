@@ -13,7 +13,7 @@
 #endif
 
 /* Changes with every change of what follows, so that no process uses a library of another version. */
-#define RUN_INTERFACE 2
+#define RUN_INTERFACE 3
 
 EXPORT int run_interface(void);
 EXPORT Engine *run_create(const Model *model);
@@ -25,6 +25,7 @@ EXPORT const double *run_values(Engine *engine, int bank);
 EXPORT const double *run_rows(const Engine *engine, int kind, size_t *count, size_t *width);
 EXPORT const Statistics *run_statistics(const Engine *engine);
 EXPORT int run_ending(const Engine *engine);
+EXPORT int run_shows_stiffness(const Engine *engine);
 EXPORT double run_time(const Engine *engine);
 EXPORT const char *run_message(const Engine *engine);
 EXPORT void run_free(Engine *engine);
@@ -101,6 +102,12 @@ const Statistics *run_statistics(const Engine *engine)
 int run_ending(const Engine *engine)
 {
     return (int)engine->status->ending;
+}
+
+/* Whether the steps of an explicit method have shown that the flow is stiff. */
+int run_shows_stiffness(const Engine *engine)
+{
+    return engine->status->is_stiff;
 }
 
 double run_time(const Engine *engine)
