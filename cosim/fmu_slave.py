@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -105,6 +106,12 @@ class FmuSlave(Slave):
         """See `Slave.get`; whole numbers are int, Booleans bool."""
         self._variable(name)
         return self._running.read(name)
+
+    def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
+        """See `Slave.reader`."""
+        for name in names:
+            self._variable(name)
+        return self._running.reader(names)
 
     def load(self) -> FmuInstance:
         """Load the FMU's binary, once for all runs; `start` does it if nobody has."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -73,10 +73,31 @@ class System:
         MisfitError
             If there is none of that name.
         """
-        if name not in self._outputs:
-            raise MisfitError(f"{name!r} is not an output; the outputs are {', '.join(self._outputs)}.")
-        slave, port = self._outputs[name]
+        slave, port = self._output(name)
         return slave.get(port)
+
+    def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
+        """Return what gives the present values of outputs, ``slave.output``, of a system that has been started.
+
+        Raises
+        ------
+        MisfitError
+            If there is none of a name.
+        """
+        outputs: dict[Slave, dict[int, str]] = {}
+        for k, name in enumerate(names):
+            slave, port = self._output(name)
+            outputs.setdefault(slave, {})[k] = port
+        readers = [(slave.reader(list(ports.values())), list(ports)) for slave, ports in outputs.items()]
+
+        def read() -> list[Any]:
+            found: list[Any] = [None] * len(names)
+            for values, places in readers:
+                for k, value in zip(places, values(), strict=True):
+                    found[k] = value
+            return found
+
+        return read
 
     def settable(self, name: str) -> tuple[str, str]:
         """Return the slave and the variable that ``slave.variable`` names, if somebody outside may set it in a run.
@@ -102,6 +123,11 @@ class System:
         """Free everything the slaves hold."""
         for slave in self.slaves.values():
             slave.close()
+
+    def _output(self, name: str) -> tuple[Slave, str]:
+        if name not in self._outputs:
+            raise MisfitError(f"{name!r} is not an output; the outputs are {', '.join(self._outputs)}.")
+        return self._outputs[name]
 
     def _connection(self, target: str, source: str) -> Connection:
         into, input_port = self._find(target, "input")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from itertools import accumulate
 from typing import Any
 
 from cosim.errors import CosimError
@@ -60,6 +61,37 @@ class FmuAccess:
             return self._calls(getter, *arguments)[index]
         except (UnicodeDecodeError, AttributeError) as error:
             raise CosimError(f"{self.instance.name}.{name} holds no text in UTF-8, as FMI wants it.") from error
+
+    def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
+        """Return what reads scalars: numbers of one type in one call of the FMU, and all else one by one."""
+        groups: dict[str, list[int]] = {}
+        for k, name in enumerate(names):
+            kind = self.instance.in_one_call(self._variables.places[name][0])
+            if kind is not None:
+                groups.setdefault(kind, []).append(k)
+        plans = [self._group([names[k] for k in places], places) for places in groups.values()]
+        apart = [k for k in range(len(names)) if not any(k in places for places in groups.values())]
+
+        def read() -> list[Any]:
+            found: list[Any] = [None] * len(names)
+            for group, places in plans:
+                values = self._calls(group)
+                for k, at in places:
+                    found[k] = values[at]
+            for k in apart:
+                found[k] = self.read(names[k])
+            return found
+
+        return read
+
+    def _group(self, names: Sequence[str], places: Sequence[int]) -> tuple[Callable[[], Any], list[tuple[int, int]]]:
+        """Return what reads scalars of one type, and where each of `places` finds its own in what that returns."""
+        variables = {place[0].valueReference: place[0] for place in map(self._variables.places.__getitem__, names)}
+        sizes = [self._variables.size(variable) for variable in variables.values()]
+        firsts = dict(zip(variables, accumulate([0, *sizes]), strict=False))
+        owners = [self._variables.places[name] for name in names]
+        at = [firsts[variable.valueReference] + index for variable, index in owners]
+        return self.instance.numbers(list(variables.values()), sizes), list(zip(places, at, strict=True))
 
     def write(self, name: str, value: Any) -> None:
         """Write a scalar; of an array the others stay as they are."""

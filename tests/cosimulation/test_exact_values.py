@@ -52,6 +52,16 @@ def test_values_reach_the_fmu_as_they_are_written(kind, text, value, stranger):
     assert type(found) is type(value)
 
 
+def test_values_read_together_are_those_read_one_by_one(stranger):
+    slave = FmuSlave("stranger", stranger())
+    slave.start(0.0, 1.0, events=False)
+    names = list(slave.outputs)[::-1] + list(slave.outputs)
+    together, apart = slave.reader(names), [slave.get(name) for name in names]
+    assert len({type(value) for value in apart}) > 3
+    assert (together(), [*map(type, together())]) == (apart, [*map(type, apart)])
+    slave.close()
+
+
 @pytest.mark.parametrize(
     ("kind", "text", "sentence"),
     [

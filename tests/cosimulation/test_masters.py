@@ -177,6 +177,19 @@ def test_the_order_of_slaves_does_not_matter_to_the_fixed_step_master():
     assert final("abc") == final("cba") == final("bca")
 
 
+def test_an_input_is_set_again_only_when_its_value_is_news():
+    class Told(AutomatonSlave):
+        def set(self, name, value):
+            given.append((name, value))
+            super().set(name, value)
+
+    given = []
+    system = System([AutomatonSlave("a", Ramp()), Told("b", Relay())], {"b.received": "a.sent"})
+    result = run_fixed_step(system, 4.0, 0.01, record=["a.sent"])
+    along = [value for _, value in given[1:]]
+    assert len(along) == len(set(along)) == len(set(result.signals["a.sent"])) > 1
+
+
 class Faulty(AutomatonSlave):
     """A slave that does not do what it should; `fault` says what."""
 
