@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.errors import DeclarationError, TraceError
-from hybrid_model.native.free_values.snapshots import Snapshot, current
+from hybrid_model.native.free_values.snapshots import Snapshot, current, why_untold
 from hybrid_model.native.model_code import run_code
 from hybrid_model.native.networks.network import NetworkTrace, trace_any
 from hybrid_model.native.run import NativeModel
@@ -59,6 +59,16 @@ def model_of(automaton: Automaton, check: Callable[[], None], *, stiff: bool = F
     if taken is not None and taken.still_holds():
         _keep(taken, model)
     return model
+
+
+def what_ran(automaton: Automaton) -> str:
+    """Return a sentence for a run on a compiled model: that it was, and why it is compiled anew each time if it is."""
+    taken = current(automaton)
+    if taken is None:
+        return f"native: its maps are compiled, and traced anew for each run: {why_untold(automaton)}."
+    if _of_snapshots.get(taken) is None:
+        return "native: its maps are compiled, and traced anew for each run: they change what they read."
+    return "native: its maps are compiled."
 
 
 def made_model(automaton: Automaton, traced: Trace | NetworkTrace, *, stiff: bool) -> NativeModel:

@@ -11,7 +11,7 @@ from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import SimulationError, TraceError
 from hybrid_model.native.driven import Driven, drive
-from hybrid_model.native.kept_models import made_model, model_of, traced_maps
+from hybrid_model.native.kept_models import made_model, model_of, traced_maps, what_ran
 from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.run import Advance, Ending, NativeModel, NativeRun, Record
 from hybrid_model.record.arc_values import ComputedValues
@@ -25,8 +25,7 @@ from hybrid_model.zeno_guard import ZenoGuard
 STEPS_AT_ONCE = 20_000
 """After so many steps a run comes back, so that it can be interrupted."""
 
-RAN = "native: its maps are compiled."
-
+_FOLLOWED = "native: its maps are compiled, together with the functions of time that its inputs are."
 _FOR_STIFF_FLOWS = (Method.RADAU, Method.BDF)
 _STOPS = {Ending.ZENO: Stop.ZENO, Ending.BLOCKED: Stop.BLOCKED, Ending.JUMPS: Stop.JUMPS}
 
@@ -92,7 +91,7 @@ def native_run(
         stop,
         message,
         one_instant(run.time, span[0], span[0]) if tolerance is None else tolerance,
-        engine=RAN,
+        engine=what_ran(automaton) if driven is None else _FOLLOWED,
         statistics=run.statistics,
     )
 

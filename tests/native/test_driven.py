@@ -121,7 +121,7 @@ def test_a_signal_that_is_no_polynomial_runs_in_python():
 
 def test_a_discrete_input_that_changes_between_its_breakpoints_runs_in_python():
     arc = hm.simulate(Follower(), 1.0, inputs={"u": hm.Signal(lambda t: 1.0, [0.5])})
-    assert arc.engine == "native: its maps are compiled."
+    assert arc.engine.startswith("native: its maps are compiled, together with")
     with pytest.raises(hm.SimulationError, match="the discrete input u changes between its breakpoints"):
         run(Follower(), 1.0, u=hm.Signal(lambda t: t, [0.5]))
 

@@ -1,5 +1,6 @@
 """Runs on the native engine: the same as in the Python engine; what runs where, and what is kept of a run."""
 
+import functools
 import pickle
 
 import numpy as np
@@ -70,9 +71,25 @@ def test_an_automaton_that_cannot_be_traced_runs_in_python_and_says_why():
         hm.simulate(Branching(), 1.0, engine="native")
 
 
+@functools.lru_cache
+def rate():
+    return 1.0
+
+
+class Cached(hm.HybridAutomaton):
+    """Reads what a cache holds: nobody can tell from outside whether that changes."""
+
+    x = hm.State(0.0)
+
+    def flow_map(self, s):
+        return {"x": rate()}
+
+
 def test_what_ran_is_told():
     ball = cases()["bouncing_ball"].automaton
     assert hm.simulate(ball, 1.0).engine == "native: its maps are compiled."
+    again = Cached()
+    assert hm.simulate(again, 1.0).engine.startswith("native: its maps are compiled, and traced anew for each run: ")
     assert hm.simulate(ball, 1.0, engine="python").engine == 'python: it was asked for (engine="python").'
     with pytest.raises(SimulationError, match="engine = 'c': give one of 'auto', 'native', 'python'"):
         hm.simulate(ball, 1.0, engine="c")
