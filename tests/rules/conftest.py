@@ -1,5 +1,7 @@
-"""Its tests of `hm.simulate` run on both engines."""
+"""The tests of this room run on both engines."""
 
-from both_engines import engine
+from both_engines import engine, on_both_engines
 
-__all__ = ["engine"]
+pytest_generate_tests = on_both_engines
+
+__all__ = ["engine", "pytest_generate_tests"]
