@@ -155,7 +155,10 @@ def _norm(vector: Any) -> Any:
 def _interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None, period: Any = None) -> Symbols:
     places, values = np.asarray(xp), np.asarray(fp)
     if places.dtype == object or values.dtype == object or period is not None or np.ndim(places) != 1:
-        raise TraceError("np.interp can be traced for a table of numbers, without a period only.")
+        raise TraceError(
+            "np.interp can be traced for a table of numbers, without a period only. Remedy: write the pieces with "
+            "np.where."
+        )
     if len(places) != len(values) or not 1 <= len(places) <= TABLE_MOST or not (np.diff(places) > 0.0).all():
         raise TraceError(
             f"np.interp can be traced for 1 to {TABLE_MOST} places in increasing order, with a value each; it has "

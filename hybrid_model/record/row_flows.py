@@ -133,7 +133,7 @@ class Rows:
 
 
 def nested(vectors: FloatArray, a: FloatArray | float) -> FloatArray:
-    """Evaluate interpolations at parts of their steps (hybrid_model/engine/dense.c).
+    """Evaluate interpolations at parts of their steps (hybrid_model/engine/methods/dense.c).
 
     Parameters
     ----------

@@ -288,7 +288,7 @@ def test_a_blocked_run_ends_with_the_values(label, make):
 def test_a_trigger_at_consensus_ends_with_a_remedy(label, make):
     """Row 35: zero is not above zero, but at or above it: a jump that leaves its state where it is."""
     journey = ended(make, Agreed, label, 1.0)
-    assert "unless its inequality is strict" in journey.component.errors[-1]
+    assert "is zero together with its error fires for ever" in journey.component.errors[-1]
     assert len(journey.component.jumps) <= 1001
     assert journey.component.get("time") == pytest.approx(0.5, abs=1e-9)
     journey.component.do("Reset")

@@ -46,7 +46,7 @@ def run(method, rtol, count, **values):
     exact = switches(count, lag)
     model = type("Model", (Counted,), {})
     solver = hm.Solver(method=method, rtol=rtol, atol=rtol)
-    arc = hm.simulate(model(**values), exact[-1][0] + 0.5, solver=solver)
+    arc = hm.simulate(model(**values), exact[-1][0] + 0.5, solver=solver, engine="python")
     assert [jump.name for jump in arc.jumps] == [name for _, name in exact]
     error = max(abs(jump.t - t) for jump, (t, _) in zip(arc.jumps, exact, strict=True))
     return arc, model.calls, error
@@ -91,7 +91,7 @@ def test_at_a_ratio_of_a_million_an_explicit_method_runs_out_of_twenty_times_the
             return super().flow_map(s)
 
     with pytest.raises(OutOfBudget) as stopped:
-        hm.simulate(Limited(), 7.0, solver=hm.Solver(method=method, rtol=1e-9, atol=1e-9))
+        hm.simulate(Limited(), 7.0, solver=hm.Solver(method=method, rtol=1e-9, atol=1e-9), engine="python")
     # Not even a fifth of the way to the first switch.
     assert float(str(stopped.value).split()[1]) < 7.0 / 5
 

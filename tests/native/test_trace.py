@@ -73,7 +73,7 @@ def test_dependencies_are_those_of_the_expressions():
     np.testing.assert_array_equal(traced.pattern("flow", "p").toarray(), [[False, False], [True, False]])
 
 
-@pytest.mark.parametrize("function", [np.argmax, np.sort, lambda x: np.interp(x[0], [0.0, 1.0], [1.0, 2.0])])
+@pytest.mark.parametrize("function", [np.argmax, np.sort, lambda x: np.interp(0.5, x, [1.0, 2.0])])
 def test_functions_that_need_numbers_are_refused_with_a_remedy(function):
     class Sorting(hm.HybridAutomaton):
         x = hm.State([1.0, 2.0])
