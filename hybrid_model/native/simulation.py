@@ -23,7 +23,9 @@ from hybrid_model.stop import Stop
 from hybrid_model.zeno_guard import ZenoGuard
 
 STEPS_AT_ONCE = 20_000
-"""After so many steps a run comes back, so that it can be interrupted."""
+"""After so many steps a run of a few states comes back, so that it can be interrupted; of many states, after fewer."""
+_STATES = 4
+"""So many are few."""
 
 _FOLLOWED = "native: its maps are compiled, together with the functions of time that its inputs are."
 _FOR_STIFF_FLOWS = (Method.RADAU, Method.BDF)
@@ -70,7 +72,7 @@ def native_run(
         else:
             model, driven = model_of(automaton, check, stiff=stiff), None
         run = NativeRun(model)
-        _set_options(run, solver, zeno)
+        _set_options(run, solver, zeno, inputs.layout.sizes[Kind.STATE])
         ended = _Driver(run, inputs, driven).run(span, record)
         # From the start, with the derivatives that another method needs: so the first run is as all later ones.
         stiff = run.shows_stiffness
@@ -151,7 +153,7 @@ def _require_options(solver: Solver) -> None:
         raise TraceError(f"the native engine looks at {Solver.scan_points} points of a step: leave scan_points out.")
 
 
-def _set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard) -> None:
+def _set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard, states: int) -> None:
     options = run.options
     options.relative_tolerance = solver.rtol
     options.absolute_tolerance = solver.atol or 0.0
@@ -162,5 +164,5 @@ def _set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard) -> None:
     options.window = -1.0 if zeno.window is None else zeno.window
     options.remainder = -1.0 if zeno.remainder is None else zeno.remainder
     options.most_jumps = zeno.max_jumps
-    options.steps_at_once, options.pauses = STEPS_AT_ONCE, 1.0
+    options.steps_at_once, options.pauses = max(1, STEPS_AT_ONCE * _STATES // max(states, _STATES)), 1.0
     options.stiff = float(solver.method in _FOR_STIFF_FLOWS)

@@ -11,6 +11,7 @@ from executions import reference, step_inputs
 import hybrid_model as hm
 from hybrid_model.declare.variables import Kind
 from hybrid_model.errors import SimulationError
+from hybrid_model.native.run import NativeRun
 
 
 @pytest.mark.parametrize("name", list(cases()))
@@ -179,3 +180,51 @@ def test_a_run_and_its_parts_are_pickled():
     again = pickle.loads(pickle.dumps(arc))
     np.testing.assert_array_equal(again["h"], arc["h"])
     assert again.at("h", 0.3) == arc.at("h", 0.3) == arc.restrict(t=(0.2, 0.4)).at("h", 0.3)
+
+
+class Oscillator(hm.HybridAutomaton):
+    x = hm.State(1.0)
+    v = hm.State(0.0)
+    passes = hm.DiscreteState(0, integer=True)
+
+    def flow_map(self, s):
+        return {"x": s.v, "v": -s.x}
+
+    def jump_set(self, s):
+        return hm.least(s.t - 40.0 * (s.passes + 1), 1.0)
+
+    def jump_map(self, s):
+        return {"passes": s.passes + 1}
+
+
+def test_a_run_that_pauses_often_is_the_same(monkeypatch):
+    """Pauses are there so that a run can be interrupted."""
+    whole = hm.simulate(Oscillator(), 100.0, engine="native")
+    monkeypatch.setattr("hybrid_model.native.simulation.STEPS_AT_ONCE", 7)
+    paused = hm.simulate(Oscillator(), 100.0, engine="native")
+    np.testing.assert_array_equal(paused.t, whole.t)
+    np.testing.assert_array_equal(paused["x"], whole["x"])
+    # Each goes on with an evaluation of the rates.
+    assert paused.statistics.steps == whole.statistics.steps
+
+
+def test_a_run_of_many_states_can_be_interrupted_after_fewer_steps(monkeypatch):
+    """A step of many states takes longer; an interrupt is heard between two advances."""
+
+    class Many(hm.HybridAutomaton):
+        x = hm.State(np.ones(100))
+
+        def flow_map(self, s):
+            return {"x": np.cos(40.0 * s.t) - s.x}
+
+    counts, advance = [], NativeRun.advance
+
+    def counted(run, *given, **named):
+        ended = advance(run, *given, **named)
+        counts.append(run.statistics.steps)
+        return ended
+
+    monkeypatch.setattr(NativeRun, "advance", counted)
+    hm.simulate(Many(), 20.0, engine="native")
+    assert len(counts) > 1
+    assert np.diff(counts, prepend=0).max() * 100 <= 1e5
