@@ -54,7 +54,7 @@ typedef struct {
     double euler_part, blind_part, first_growth, first_least, reach_step, reach_at[N_REACH_AT];
     double probe_parts[N_PROBE_PARTS], steady;
     double sliding_after, sliding_looks, sliding_found, sliding_left, sliding_ahead;
-    double retained, halvings_least, halvings_most, away[N_AWAY], pace_steps, most_steps;
+    double retained, halvings_least, halvings_most, away[N_AWAY], pace_steps, most_compiled_steps;
 } ModelScales;
 
 typedef struct {

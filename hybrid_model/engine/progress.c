@@ -245,7 +245,7 @@ static bool keep_pace(Engine *engine, const Point *point, double limit)
     if (pace[PACE_STEPS] < scales->pace_steps)
         return true;
     double needed = (limit - t) / (t - pace[PACE_BEGIN]) * scales->pace_steps;
-    if (point == &engine->live && needed > scales->most_steps)
+    if (point == &engine->live && needed > scales->most_compiled_steps)
         return creeps(engine, point, needed, limit);
     pace[PACE_STEPS] = 0.0;
     pace[PACE_BEGIN] = t;

@@ -72,6 +72,27 @@ def test_an_automaton_that_cannot_be_traced_runs_in_python_and_says_why():
         hm.simulate(Branching(), 1.0, engine="native")
 
 
+def test_a_long_run_of_a_smooth_flow_is_not_given_up():
+    """Of some 1e7 steps at its pace, which are a matter of ten seconds."""
+
+    class Oscillator(hm.HybridAutomaton):
+        x = hm.State(1.0)
+        v = hm.State(0.0)
+
+        def flow_map(self, s):
+            return {"x": s.v, "v": -s.x}
+
+        def jump_set(self, s):
+            return s.t - 100.0
+
+        def jump_map(self, s):
+            return {"x": np.nan}
+
+    # The run goes on to the jump, which ends it, and is not given up for its pace at the first look.
+    with pytest.raises(hm.SimulationError, match="x = nan after jump 'jump' at t = 100 s"):
+        hm.simulate(Oscillator(), 1e5, engine="native", record="events")
+
+
 @functools.lru_cache
 def rate():
     return 1.0
