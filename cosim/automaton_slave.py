@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,9 +14,13 @@ from hybrid_model import Automaton, Execution, Solver, ZenoGuard
 from hybrid_model.declare.layout import Layout, layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import Kind, element_names
-from hybrid_model.errors import SchedulingError
+from hybrid_model.errors import BuildError, SchedulingError, TraceError
 from hybrid_model.schedule.automaton_block import AutomatonBlock
 from hybrid_model.schedule.blocks import Step, Update
+from hybrid_model.simulate import ENGINES, checked, require_choice
+
+if TYPE_CHECKING:
+    from hybrid_model.schedule.native_block import NativeBlock
 
 
 class AutomatonSlave(Slave):
@@ -30,12 +34,15 @@ class AutomatonSlave(Slave):
         What runs.
     solver : Solver, optional
         Accuracy.
+    engine : {"auto", "native", "python"}
+        As in `hybrid_model.simulate`.
     """
 
     has_event_mode = True
     can_restore = True
 
-    def __init__(self, name: str, automaton: Automaton, solver: Solver | None = None) -> None:
+    def __init__(self, name: str, automaton: Automaton, solver: Solver | None = None, *, engine: str = "auto") -> None:
+        require_choice("engine", engine, ENGINES)
         layout = layout_of(automaton)
         ports: dict[Kind, list[Port]] = {kind: [] for kind in Kind}
         for variable in automaton.variables:
@@ -50,13 +57,13 @@ class AutomatonSlave(Slave):
         tunable = [e for v in automaton.of_kind(Kind.PARAMETER) if v.tunable for e in element_names(v)]
         super().__init__(name, ports[Kind.INPUT], outputs, [clock.name for clock in automaton.clocks], tunable)
         self.automaton = automaton
-        self._solver = solver
+        self._solver, self._engine = solver or Solver(), engine
         self._whole = {e for v in automaton.variables if v.integer for e in element_names(v)}
         self._ranges = {e: (v.minimum, v.maximum) for v in automaton.variables for e in element_names(v)}
         self._names = [element for kind in Kind for element in layout.names(kind)]
         self._predictable = all(port.discrete for port in ports[Kind.INPUT])
         self._starts: dict[str, float] = {}
-        self._block: AutomatonBlock | None = None
+        self._block: AutomatonBlock | NativeBlock | None = None
         self._begun = False
 
     @property
@@ -94,23 +101,47 @@ class AutomatonSlave(Slave):
 
     def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
         """See `Slave.start`."""
-        run = Execution(
-            self.automaton,
-            t_start=t_start,
-            t_stop=t_stop,
-            inputs=Inputs(Layout(self.automaton)),
-            solver=self._solver,
-            # Nothing is recorded, so nothing grows with the number of jumps (rule 7).
-            zeno=ZenoGuard(max_jumps=sys.maxsize),
-        )
-        self._block = AutomatonBlock(self.name, run, t_stop, predictable=self._predictable, events=events, keep=False)
+        self._block = self._block_of((t_start, t_stop), events=events)
         for name, value in self._starts.items():
             self._block.set(name, value)
-        run.compute_start()
+        if isinstance(self._block, AutomatonBlock):
+            self._block.run.compute_start()
+
+    def _block_of(self, span: tuple[float, float], *, events: bool) -> AutomatonBlock | NativeBlock:
+        # Nothing is recorded, so nothing grows with the number of jumps (rule 7).
+        zeno = ZenoGuard(max_jumps=sys.maxsize)
+
+        def run() -> Execution:
+            inputs = Inputs(Layout(self.automaton))
+            return Execution(
+                self.automaton, t_start=span[0], t_stop=span[1], inputs=inputs, solver=self._solver, zeno=zeno
+            )
+
+        if self._engine != "python":
+            # CasADi is imported by whoever runs something.
+            from hybrid_model.schedule.native_block import NativeBlock
+
+            try:
+                return NativeBlock(
+                    self.name,
+                    self.automaton,
+                    span,
+                    Inputs(Layout(self.automaton)),
+                    self._solver,
+                    zeno,
+                    predictable=self._predictable,
+                    events=events,
+                    check=lambda: checked(run()),
+                )
+            except (TraceError, BuildError) as error:
+                if self._engine == "native":
+                    raise CosimError(f"{self.name} cannot run on the native engine: {error}") from error
+        return AutomatonBlock(self.name, run(), span[1], predictable=self._predictable, events=events, keep=False)
 
     def begin(self) -> None:
         """See `Slave.begin`."""
-        self._running.run.compute_start()
+        if isinstance(self._block, AutomatonBlock):
+            self._block.run.compute_start()
         self._running.begin()
         self._begun = True
 
@@ -153,7 +184,7 @@ class AutomatonSlave(Slave):
             raise MisfitError(f"{self.name}.{name} is set to {value}, {bound}: give a value in its range.")
 
     @property
-    def _running(self) -> AutomatonBlock:
+    def _running(self) -> AutomatonBlock | NativeBlock:
         if self._block is None:
             raise CosimError(f"{self.name} has not been started: call start first.")
         return self._block

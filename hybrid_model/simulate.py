@@ -84,8 +84,8 @@ def simulate(
     require_inputs(inputs)
     require_options("solver", solver, Solver, first="method")
     require_options("zeno", zeno, ZenoGuard, first="max_jumps")
-    _require_choice("engine", engine, ENGINES)
-    _require_choice("record", record, RECORDS)
+    require_choice("engine", engine, ENGINES)
+    require_choice("record", record, RECORDS)
     t_start, t_end = real_number("t_start", t_start), real_number("t_end", t_end)
     if not (math.isfinite(t_end) and t_end >= t_start):
         raise SimulationError(
@@ -118,10 +118,8 @@ def _native_run(
     from hybrid_model.native.simulation import native_run
 
     def check() -> None:
-        """Call the maps with numbers: slips in them are told as the author wrote them, not as they are traced."""
-        start = Execution(automaton, t_start=span[0], t_stop=span[1], inputs=inputs, solver=solver, zeno=zeno)
-        if start.x.size and start.due() is None and start.in_flow_set() and span[1] > span[0]:
-            start.rates_at(start.t, start.x)
+        # Slips in maps are told as the author wrote them, not as they are traced.
+        checked(Execution(automaton, t_start=span[0], t_stop=span[1], inputs=inputs, solver=solver, zeno=zeno))
 
     return native_run(automaton, inputs, span, solver, zeno, events_only=record == "events", check=check)
 
@@ -152,6 +150,13 @@ def _reference_run(
     return RunRecord(read, recording.flows, recording.jumps, stop, message, execution.event_tolerance)
 
 
-def _require_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
+def checked(start: Execution) -> None:
+    """Call the maps at the start with numbers, those of the flow where a run would flow from there."""
+    if start.x.size and start.due() is None and start.in_flow_set() and start.t_stop > start.t:
+        start.rates_at(start.t, start.x)
+
+
+def require_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
+    """Raise SimulationError for a value that is none of the choices."""
     if given not in choices:
         raise SimulationError(f"{name} = {told(given)}: give one of {', '.join(map(repr, choices))}.")

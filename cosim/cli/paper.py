@@ -36,7 +36,7 @@ COMPARE_INTERVAL = 0.5
 
 @dataclass(frozen=True)
 class Trial:
-    """One way to run a scenario, and how far it is from the Python run.
+    """One way to run a scenario, and how far it is from the run of all agents as one automaton.
 
     `event_time_difference` is None if the numbers of events differ.
     """
@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _compare(kind: str, scenario: Scenario, out: Path) -> Comparison:
-    progress(f"{kind}: running in Python")
+    progress(f"{kind}: running as one automaton")
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
     report = run_report(scenario, arc)
     fmus = _export(kind, scenario, out)
@@ -214,9 +214,9 @@ def _table(comparisons: Mapping[str, Comparison]) -> str:
     ]
     for kind, comparison in comparisons.items():
         report = comparison.report
-        python = Trial("Python, one automaton", report.events_per_agent, report.edge_norm_end, 0.0, 0.0)
-        for trial in (python, *comparison.exact, *comparison.fixed.values()):
-            lines.append(_row(kind, trial, reference=trial is python))
+        whole = Trial("one automaton", report.events_per_agent, report.edge_norm_end, 0.0, 0.0)
+        for trial in (whole, *comparison.exact, *comparison.fixed.values()):
+            lines.append(_row(kind, trial, reference=trial is whole))
             kind = ""
     return "\n".join(lines)
 

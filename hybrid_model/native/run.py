@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import enum
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,10 +15,10 @@ from hybrid_model.native.build.libraries import MODEL_SYMBOL, engine_library, mo
 from hybrid_model.record.row_flows import Rows
 from hybrid_model.record.run_record import RunStatistics
 
-_INTERFACE = 3
+_INTERFACE = 4
 """Of `run_interface` in exports.c."""
 
-_KINDS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
+_KINDS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER, Kind.OUTPUT)
 """In the order of the engine's banks."""
 
 
@@ -41,6 +42,19 @@ class _Statistics(ctypes.Structure):
     _fields_ = [(name, ctypes.c_uint64) for name in _COUNTS]
 
 
+class Update(ctypes.Structure):
+    """What one event iteration gave: `RunUpdate` in exports.c."""
+
+    _fields_ = [("jump", ctypes.c_size_t), ("again", ctypes.c_int), ("over", ctypes.c_int), ("next", ctypes.c_double)]
+
+
+class View(enum.IntEnum):
+    """What is read: the start values, or the run as it is."""
+
+    START = 1
+    LIVE = 2
+
+
 class Record(enum.IntEnum):
     """What is kept of a run."""
 
@@ -54,6 +68,7 @@ class Advance(enum.IntEnum):
 
     REACHED = 0
     EVENT_AT_TARGET = 1
+    EVENT_BEFORE = 2
     ENDED = 3
     PAUSED = 4
 
@@ -82,6 +97,15 @@ def _engine() -> ctypes.CDLL:
         "run_advance": (ctypes.c_int, [engine, number, ctypes.c_int]),
         "run_set": (None, [engine, ctypes.c_int, size, number]),
         "run_values": (ctypes.c_void_p, [engine, ctypes.c_int]),
+        "run_place": (None, [engine, ctypes.c_void_p, number, number]),
+        "run_begin": (ctypes.c_int, [engine, ctypes.c_int]),
+        "run_update": (None, [engine, number, ctypes.c_int, ctypes.POINTER(Update)]),
+        "run_step": (ctypes.c_int, [engine, number, ctypes.c_int]),
+        "run_read": (ctypes.c_void_p, [engine, ctypes.c_int, ctypes.c_int]),
+        "run_block_size": (size, [engine]),
+        "run_save": (None, [engine, ctypes.c_void_p]),
+        "run_restore": (None, [engine, ctypes.c_void_p]),
+        "run_problem": (ctypes.c_char_p, [engine]),
         "run_rows": (ctypes.c_void_p, [engine, ctypes.c_int, count, count]),
         "run_statistics": (ctypes.POINTER(_Statistics), [engine]),
         "run_ending": (ctypes.c_int, [engine]),
@@ -161,9 +185,47 @@ class NativeRun:
             Continuous states, discrete states, inputs, parameters.
         """
         self._states, self._discrete = (len(value) for value in values[:2])
-        vectors = [np.ascontiguousarray(value, dtype=np.float64) for value in values]
-        pointers = (ctypes.c_void_p * len(vectors))(*(vector.ctypes.data for vector in vectors))
-        return bool(self._library.run_start(self._engine, pointers, start, stop, record))
+        with _pointers(values) as pointers:
+            return bool(self._library.run_start(self._engine, pointers, start, stop, record))
+
+    def place(self, values: Sequence[FloatArray], start: float, stop: float) -> None:
+        """Take values and the span of a run that is not recorded; `begin` begins it. See `start`."""
+        with _pointers(values) as pointers:
+            self._library.run_place(self._engine, pointers, start, stop)
+
+    def begin(self, *, inside: bool) -> bool:
+        """Begin a run that has been placed; False if it is over at once. `inside`: take the jumps that are due."""
+        return bool(self._library.run_begin(self._engine, inside))
+
+    def update(self, stop: float, *, predicts: bool) -> Update:
+        """Take the jump that is due, if one is, and look ahead for the next event, at most to `stop` in s."""
+        update = Update()
+        self._library.run_update(self._engine, stop, predicts, ctypes.byref(update))
+        return update
+
+    def step(self, target: float, *, inside: bool) -> Advance:
+        """Go on to the target, in s, or to the first event before it unless events are taken inside."""
+        return Advance(self._library.run_step(self._engine, target, inside))
+
+    def read(self, view: View, kind: Kind, index: int) -> float | None:
+        """Return a scalar; None if it cannot be computed, then `problem` says why."""
+        place = self._library.run_read(self._engine, view, _KINDS.index(kind))
+        return None if not place else float(ctypes.c_double.from_address(place + 8 * index).value)
+
+    def save(self) -> ctypes.Array[ctypes.c_char]:
+        """Return all that evolves."""
+        block = ctypes.create_string_buffer(self._library.run_block_size(self._engine))
+        self._library.run_save(self._engine, block)
+        return block
+
+    def restore(self, block: ctypes.Array[ctypes.c_char]) -> None:
+        """Return to what was saved."""
+        self._library.run_restore(self._engine, block)
+
+    @property
+    def problem(self) -> str:
+        """Why the last call that failed did so."""
+        return str(self._library.run_problem(self._engine).decode())
 
     def advance(self, target: float, *, take: bool = True) -> Advance:
         """Go on to the target, in s, and take the jumps that are due there unless inputs are to change first."""
@@ -211,6 +273,13 @@ class NativeRun:
         count, width = ctypes.c_size_t(), ctypes.c_size_t()
         place = self._library.run_rows(self._engine, kind, ctypes.byref(count), ctypes.byref(width))
         return _copied(place, (count.value, width.value))
+
+
+@contextlib.contextmanager
+def _pointers(values: Sequence[FloatArray]) -> Iterator[ctypes.Array[ctypes.c_void_p]]:
+    """Give the addresses of vectors for the time of a call."""
+    vectors = [np.ascontiguousarray(value, dtype=np.float64) for value in values]
+    yield (ctypes.c_void_p * len(vectors))(*(vector.ctypes.data for vector in vectors))
 
 
 def _copied(place: int | None, shape: tuple[int, ...]) -> FloatArray:

@@ -28,7 +28,7 @@ _STATES = 4
 """So many are few."""
 
 _FOLLOWED = "native: its maps are compiled, together with the functions of time that its inputs are."
-_FOR_STIFF_FLOWS = (Method.RADAU, Method.BDF)
+FOR_STIFF_FLOWS = (Method.RADAU, Method.BDF)
 _STOPS = {Ending.ZENO: Stop.ZENO, Ending.BLOCKED: Stop.BLOCKED, Ending.JUMPS: Stop.JUMPS}
 
 
@@ -64,15 +64,15 @@ def native_run(
     SimulationError
         If the run cannot start or go on.
     """
-    _require_options(solver)
-    record, stiff = Record.JUMPS if events_only else Record.ALL, solver.method in _FOR_STIFF_FLOWS
+    require_supported(solver)
+    record, stiff = Record.JUMPS if events_only else Record.ALL, solver.method in FOR_STIFF_FLOWS
     for again in (False, True):
         if inputs.vary:
             model, driven = _driven_model(automaton, inputs, check, stiff=stiff)
         else:
             model, driven = model_of(automaton, check, stiff=stiff), None
         run = NativeRun(model)
-        _set_options(run, solver, zeno, inputs.layout.sizes[Kind.STATE])
+        set_options(run, solver, zeno, inputs.layout.sizes[Kind.STATE])
         ended = _Driver(run, inputs, driven).run(span, record)
         # From the start, with the derivatives that another method needs: so the first run is as all later ones.
         stiff = run.shows_stiffness
@@ -146,14 +146,16 @@ def _driven_model(
     return made_model(automaton, driven.trace, stiff=stiff), driven
 
 
-def _require_options(solver: Solver) -> None:
-    if solver.method not in (Method.DOP853, Method.RK45, *_FOR_STIFF_FLOWS):
+def require_supported(solver: Solver) -> None:
+    """Raise TraceError for what a solver is asked for and the native engine does not do."""
+    if solver.method not in (Method.DOP853, Method.RK45, *FOR_STIFF_FLOWS):
         raise TraceError(f"the native engine does not step with {solver.stepper.__name__}.")
     if solver.scan_points != Solver.scan_points:
         raise TraceError(f"the native engine looks at {Solver.scan_points} points of a step: leave scan_points out.")
 
 
-def _set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard, states: int) -> None:
+def set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard, states: int) -> None:
+    """Give a run of so many states, which has not begun, its accuracy and what counts as an accumulation of jumps."""
     options = run.options
     options.relative_tolerance = solver.rtol
     options.absolute_tolerance = solver.atol or 0.0
@@ -165,4 +167,4 @@ def _set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard, states: int) -
     options.remainder = -1.0 if zeno.remainder is None else zeno.remainder
     options.most_jumps = zeno.max_jumps
     options.steps_at_once, options.pauses = max(1, STEPS_AT_ONCE * _STATES // max(states, _STATES)), 1.0
-    options.stiff = float(solver.method in _FOR_STIFF_FLOWS)
+    options.stiff = float(solver.method in FOR_STIFF_FLOWS)

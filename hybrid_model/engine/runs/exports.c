@@ -13,13 +13,30 @@
 #endif
 
 /* Changes with every change of what follows, so that no process uses a library of another version. */
-#define RUN_INTERFACE 3
+#define RUN_INTERFACE 4
+
+/* What one event iteration gave: the jump that was taken (n_jumps if none), whether another one is due, whether the run
+   is over, and when the next event comes (infinite if that is not known). */
+typedef struct {
+    size_t jump;
+    int again, over;
+    double next;
+} RunUpdate;
 
 EXPORT int run_interface(void);
 EXPORT Engine *run_create(const Model *model);
 EXPORT EngineOptions *run_options(Engine *engine);
 EXPORT int run_start(Engine *engine, const double *const values[], double start, double stop, int record);
 EXPORT int run_advance(Engine *engine, double target, int take);
+EXPORT void run_place(Engine *engine, const double *const values[], double start, double stop);
+EXPORT int run_begin(Engine *engine, int inside);
+EXPORT void run_update(Engine *engine, double stop, int predicts, RunUpdate *update);
+EXPORT int run_step(Engine *engine, double target, int inside);
+EXPORT const double *run_read(Engine *engine, int view, int bank);
+EXPORT size_t run_block_size(const Engine *engine);
+EXPORT void run_save(Engine *engine, void *block);
+EXPORT void run_restore(Engine *engine, const void *block);
+EXPORT const char *run_problem(const Engine *engine);
 EXPORT void run_set(Engine *engine, int bank, size_t index, double value);
 EXPORT const double *run_values(Engine *engine, int bank);
 EXPORT const double *run_rows(const Engine *engine, int kind, size_t *count, size_t *width);
@@ -53,8 +70,8 @@ static int fail(Engine *engine)
     return 0;
 }
 
-/* Begins a run with values of the states, inputs and parameters, in the order of the banks. */
-int run_start(Engine *engine, const double *const values[], double start, double stop, int record)
+/* Before a run: values of the states, inputs and parameters, in the order of the banks, and the times of its span. */
+void run_place(Engine *engine, const double *const values[], double start, double stop)
 {
     const Model *m = engine->model;
     engine_copy(engine->live.x, values[BANK_STATE], m->n_states);
@@ -62,8 +79,70 @@ int run_start(Engine *engine, const double *const values[], double start, double
     engine_copy(engine->u, values[BANK_INPUT], m->n_inputs);
     engine_copy(engine->p, values[BANK_PARAMETER], m->n_parameters);
     engine_set_span(engine, start, stop);
+}
+
+/* Begins a run and its record. */
+int run_start(Engine *engine, const double *const values[], double start, double stop, int record)
+{
+    run_place(engine, values, start, stop);
     engine_record(engine, (RecordKind)record);
     return engine_start(engine) || fail(engine);
+}
+
+/* Begins a run that has been placed and is not recorded; who wants events inside has the jumps of the start taken. */
+int run_begin(Engine *engine, int inside)
+{
+    if (!engine_start(engine))
+        return fail(engine);
+    bool going = !inside || engine_jump_all(engine);
+    engine_clear_ticks(engine);
+    return going;
+}
+
+/* Takes the jump that comes next, if one is due; looks ahead where none is due then, at most to `stop`. */
+void run_update(Engine *engine, double stop, int predicts, RunUpdate *update)
+{
+    size_t n = engine->model->n_jumps;
+    bool changed;
+    *update = (RunUpdate){.over = !engine_jump(engine, &changed), .next = INFINITY};
+    while (update->jump < n && !engine_ticked(engine, update->jump))
+        update->jump++;
+    engine_clear_ticks(engine);
+    update->again = !update->over && engine_pending(engine) < n;
+    double next;
+    if (!update->over && !update->again && predicts && engine_predict(engine, stop, &next))
+        update->next = next;
+}
+
+/* Goes on to the target, or to the first event if events are not taken inside. */
+int run_step(Engine *engine, double target, int inside)
+{
+    return (int)engine_advance(engine, target, inside ? EVENTS_INSIDE : EVENTS_STOP);
+}
+
+const double *run_read(Engine *engine, int view, int bank)
+{
+    return engine_values(engine, (View)view, (Bank)bank);
+}
+
+size_t run_block_size(const Engine *engine)
+{
+    return engine_block_size(engine);
+}
+
+void run_save(Engine *engine, void *block)
+{
+    engine_save(engine, block);
+}
+
+void run_restore(Engine *engine, const void *block)
+{
+    engine_restore(engine, block);
+}
+
+const char *run_problem(const Engine *engine)
+{
+    return engine_problem(engine);
 }
 
 /* Goes on to the target; the jumps that are due there are taken if the run ends there, and else left to inputs that
