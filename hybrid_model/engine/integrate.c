@@ -45,12 +45,11 @@ static bool step_too_small(Engine *engine, const Point *point, double h, bool fi
 /* The proposal for the step after one of the length `used` where `h` was possible. */
 static double next_step(const Method *method, double h, double used, double error, bool rejected)
 {
-    /* An error of nothing says nothing: rates that are constant here may change within the next step and back. */
-    const double most = 10.0, unknown = 2.0;
+    const double most = 10.0;
     /* A step cut short by the limit says little about the next one, and no root need be taken. */
     if (used * most <= h)
         return h;
-    double growth = error > 0.0 ? fmin(most, 0.9 * pow(error, -1.0 / method->order)) : unknown;
+    double growth = error > 0.0 ? fmin(most, 0.9 * pow(error, -1.0 / method->order)) : most;
     double proposal = used * (rejected ? fmin(1.0, growth) : fmax(0.2, growth));
     return used < h ? fmax(h, proposal) : proposal;
 }
