@@ -152,7 +152,7 @@ def _reference_run(
 
 def checked(start: Execution) -> None:
     """Call the maps at the start with numbers, those of the flow where a run would flow from there."""
-    if start.x.size and start.due() is None and start.in_flow_set() and start.t_stop > start.t:
+    if start.due() is None and start.x.size and start.in_flow_set() and start.t_stop > start.t:
         start.rates_at(start.t, start.x)
 
 

@@ -39,7 +39,6 @@ FAULTS = {
         "if (point == &engine->live && !engine_record_step(",
         "if (0 && !engine_record_step(",
     ),
-    "rows do not grow": ("recorder.c", "2 * rows->capacity", "rows->capacity"),
     "jumps are not counted": ("jumps.c", "engine->statistics.jumps++;", ""),
     "a run does not come back": ("engine.c", "return ADVANCE_PAUSED;", "return ADVANCE_REACHED;"),
 }
