@@ -25,10 +25,12 @@ if TYPE_CHECKING:
     from hybrid_model.consensus.graphs.digraphs import BalancedSwitching
     from hybrid_model.consensus.graphs.generators import (
         AgentGraph,
+        GraphKind,
         agent_graph,
         complete_graph,
         erdos_renyi_graph,
         geometric_graph,
+        graph_of_kind,
         path_graph,
         regular_graph,
         ring_graph,
@@ -99,6 +101,7 @@ __all__ = [
     "GatedAbsoluteSineWeights",
     "GatedSine",
     "GatedSineWeights",
+    "GraphKind",
     "Integrator",
     "JointExcitation",
     "MixedTrigger",
@@ -145,6 +148,7 @@ __all__ = [
     "floquet_spectrum",
     "gap_statistics",
     "geometric_graph",
+    "graph_of_kind",
     "joint_connectivity_window",
     "joint_excitation",
     "jointly_connected_sequence",

@@ -6,6 +6,8 @@ order, and that a graph which must be connected is drawn again, with the same ge
 
 from __future__ import annotations
 
+import enum
+import math
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 
@@ -17,10 +19,12 @@ from hybrid_model.consensus.graphs.undirected import Edge, validate_edges
 
 __all__ = [
     "AgentGraph",
+    "GraphKind",
     "agent_graph",
     "complete_graph",
     "erdos_renyi_graph",
     "geometric_graph",
+    "graph_of_kind",
     "path_graph",
     "regular_graph",
     "reorient",
@@ -30,6 +34,24 @@ __all__ = [
 ]
 
 _MOST_DRAWS = 1000
+
+
+class GraphKind(enum.Enum):
+    """Families of graphs that a name, a number of agents, a degree and a seed decide."""
+
+    PATH = "path"
+    RING = "ring"
+    STAR = "star"
+    COMPLETE = "complete"
+    REGULAR = "regular"
+    ERDOS_RENYI = "erdos-renyi"
+    GEOMETRIC = "geometric"
+    SMALL_WORLD = "small-world"
+
+    @property
+    def is_random(self) -> bool:
+        """Whether degree and seed say anything."""
+        return self not in (GraphKind.PATH, GraphKind.RING, GraphKind.STAR, GraphKind.COMPLETE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +221,53 @@ def small_world_graph(
         connected,
         f"rewiring {rewiring}",
     )
+
+
+def graph_of_kind(
+    kind: GraphKind | str, agents: int, degree: float = 4, seed: int = 0, *, rewiring: float = 0.1
+) -> AgentGraph:
+    """A connected graph by the name of its family.
+
+    Parameters
+    ----------
+    kind : GraphKind or str
+        ``"path"``, ``"ring"``, ``"star"``, ``"complete"``, or one that is drawn: ``"regular"``, ``"erdos-renyi"``,
+        ``"geometric"``, ``"small-world"``.
+    agents : int
+        n.
+    degree : float
+        Neighbours of an agent: of each one in regular graphs, where it is whole, and in the ring of a small world,
+        where it is even as well; on the average in Erdos-Renyi graphs, and in geometric ones inside of the square.
+    seed : int
+        Of the random generator.
+    rewiring : float
+        Of a small world, see `small_world_graph`.
+
+    Raises
+    ------
+    ValueError
+        If there is no such family or graph.
+    """
+    names = [known.value for known in GraphKind]
+    if kind not in (*GraphKind, *names):
+        raise ValueError(f"there is no graph '{kind}'; it must be one of {', '.join(names)}.")
+    wanted = GraphKind(kind)
+    if wanted.is_random and not 0 < degree < agents:
+        raise ValueError(f"degree is {degree}; it must lie between 0 and the number of agents, {agents}.")
+    if wanted in (GraphKind.REGULAR, GraphKind.SMALL_WORLD) and degree != int(degree):
+        raise ValueError(f"degree is {degree}; in a {wanted.value} graph it must be whole.")
+    others = max(agents - 1, 1)
+    makers: dict[GraphKind, Callable[[], AgentGraph]] = {
+        GraphKind.PATH: lambda: path_graph(agents),
+        GraphKind.RING: lambda: ring_graph(agents),
+        GraphKind.STAR: lambda: star_graph(agents),
+        GraphKind.COMPLETE: lambda: complete_graph(agents),
+        GraphKind.REGULAR: lambda: regular_graph(agents, int(degree), seed),
+        GraphKind.ERDOS_RENYI: lambda: erdos_renyi_graph(agents, min(degree / others, 1.0), seed),
+        GraphKind.GEOMETRIC: lambda: geometric_graph(agents, math.sqrt(degree / (math.pi * others)), seed),
+        GraphKind.SMALL_WORLD: lambda: small_world_graph(agents, int(degree), rewiring, seed),
+    }
+    return makers[wanted]()
 
 
 def _drawn(

@@ -8,10 +8,12 @@ import pytest
 
 from hybrid_model.consensus.graphs.connectivity import algebraic_connectivity, components, is_connected
 from hybrid_model.consensus.graphs.generators import (
+    GraphKind,
     agent_graph,
     complete_graph,
     erdos_renyi_graph,
     geometric_graph,
+    graph_of_kind,
     path_graph,
     regular_graph,
     reorient,
@@ -83,6 +85,33 @@ def test_graphs_that_need_not_be_connected_follow_the_family():
     mean = np.mean([len(graph.edges) for graph in graphs])
     # 15 pairs: mean 3.0 (a little more without empty graphs), standard deviation of the mean 0.11.
     assert mean == pytest.approx(3.0, abs=0.5)
+
+
+@pytest.mark.parametrize("kind", GraphKind)
+def test_graphs_by_the_name_of_their_family_have_their_agents_and_are_connected(kind):
+    graph, again = (graph_of_kind(kind.value, 12, degree=4, seed=5) for _ in range(2))
+    assert (graph.agents, graph.edges) == (12, again.edges)
+    assert is_connected(graph.agents, graph.edges)
+    assert (graph.edges != graph_of_kind(kind, 12, degree=4, seed=6).edges) == kind.is_random
+
+
+def test_mean_degrees_are_about_what_was_asked_for():
+    # Expected n k/2 = 1200 edges with a standard deviation below sqrt(1200); borders cost geometric graphs some.
+    for kind, least in (("regular", 1200), ("small-world", 1200), ("erdos-renyi", 1050), ("geometric", 950)):
+        assert least <= len(graph_of_kind(kind, 200, degree=12, seed=1).edges) <= (1350 if least < 1200 else 1200)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("torus", 9), "no graph 'torus'; it must be one of path, ring"),
+        (("regular", 9, 12), "degree is 12; it must lie between 0 and the number of agents, 9"),
+        (("small-world", 9, 2.5), "in a small-world graph it must be whole"),
+    ],
+)
+def test_graphs_by_name_that_cannot_be_are_refused(arguments, message):
+    with pytest.raises(ValueError, match=message):
+        graph_of_kind(*arguments)
 
 
 def test_networkx_graphs_are_numbered_in_the_order_of_their_nodes():
