@@ -47,7 +47,11 @@ class AutomatonSlave(Slave):
         ports: dict[Kind, list[Port]] = {kind: [] for kind in Kind}
         for variable in automaton.variables:
             discrete = variable.discrete or variable.kind is Kind.DISCRETE
-            ports[variable.kind] += [Port(element, variable.unit, discrete) for element in element_names(variable)]
+            elements = element_names(variable)
+            array = "" if elements == [variable.name] else variable.name
+            ports[variable.kind] += [
+                Port(name, variable.unit, discrete, whole=variable.integer, array=array) for name in elements
+            ]
         outputs = [
             port
             for kind in (Kind.OUTPUT, Kind.STATE, Kind.DISCRETE)

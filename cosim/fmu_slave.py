@@ -175,16 +175,16 @@ class FmuSlave(Slave):
         """See `Slave.save`."""
         if not self.can_restore:
             raise CosimError(f"{self.name} cannot save its state: its canGetAndSetFMUState is false.")
-        return self._calls(self._instance.save)
+        return self._calls(self._instance.save), self._running.held()
 
     def restore(self, state: Any) -> None:
         """See `Slave.restore`."""
-        self._calls(self._instance.restore, state)
-        self._running.forget()
+        self._calls(self._instance.restore, state[0])
+        self._running.recall(state[1])
 
     def release(self, state: Any) -> None:
         """See `Slave.release`."""
-        self._calls(self._instance.release, state)
+        self._calls(self._instance.release, state[0])
 
     def close(self) -> None:
         """See `Slave.close`."""

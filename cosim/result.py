@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from hybrid_model.schedule.blocks import Termination
 from hybrid_model.schedule.scheduler import Event, Tick
+
+Watch = Callable[["CosimResult"], None]
+"""Told of a run after each row, with the result so far."""
 
 
 class Ended(enum.Enum):
@@ -41,6 +46,10 @@ class CosimResult:
         Steps made by all slaves together.
     events : list of Event
         Instants at which slaves had events of their own, in order; of masters that handle events.
+    treatment : dict
+        Slave -> how its events are treated, in words.
+    watch : callable, optional
+        Called with this result after each row.
     """
 
     ended: Ended = Ended.HORIZON
@@ -52,6 +61,16 @@ class CosimResult:
     final: dict[str, float] = field(default_factory=dict)
     steps: int = 0
     events: list[Event] = field(default_factory=list)
+    treatment: dict[str, str] = field(default_factory=dict)
+    watch: Watch | None = field(default=None, repr=False, compare=False)
+
+    def keep(self, t: float, names: Sequence[str], values: Sequence[Any]) -> None:
+        """Append a row: the named outputs at `t` in s."""
+        self.times.append(t)
+        for name, value in zip(names, values, strict=True):
+            self.signals.setdefault(name, []).append(value)
+        if self.watch is not None:
+            self.watch(self)
 
     def terminate(self, slave: str, t: float, why: Termination) -> None:
         """Note that a slave ended the run at `t` in s."""

@@ -23,13 +23,38 @@ class Port:
     discrete : bool
         Whether it changes only at events.
     kind : str
-        What it carries: ``number``, ``text`` or ``bytes``.
+        What it carries: ``number``, ``truth`` (a Boolean), ``text`` or ``bytes``.
+    whole : bool
+        Whether its numbers are whole.
+    array : str
+        Name of the array that it is an element of, if it is one.
+    measure : Measure or None
+        What its unit is in SI units, as far as the block says.
     """
 
     name: str
     unit: str = ""
     discrete: bool = False
     kind: str = "number"
+    whole: bool = False
+    array: str = ""
+    measure: Measure | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A unit in SI base units: a value in them is ``factor * value + offset``.
+
+    Attributes
+    ----------
+    exponents : tuple of int
+        Of kg, m, s, A, K, mol, cd and rad.
+    factor, offset : float
+    """
+
+    exponents: tuple[int, ...]
+    factor: float = 1.0
+    offset: float = 0.0
 
 
 class Slave(Block):
@@ -126,6 +151,10 @@ class Slave(Block):
     @abstractmethod
     def close(self) -> None:
         """Free everything the block holds."""
+
+    def has(self, name: str) -> bool:
+        """Return whether there is a variable of that name: a scalar, or an array."""
+        return any(own == name or own.startswith(f"{name}[") for own in self.variable_names)
 
     def unknown(self, name: str) -> MisfitError:
         """Return the error for a name that the block does not have."""

@@ -9,6 +9,14 @@ from typing import Any
 from cosim.errors import MisfitError
 from cosim.slave import Port, Slave
 
+_TYPES = {
+    ("number", False): "numbers",
+    ("number", True): "whole numbers",
+    ("truth", False): "truth values",
+    ("text", False): "text",
+    ("bytes", False): "bytes",
+}
+
 
 @dataclass(frozen=True)
 class Connection:
@@ -18,6 +26,17 @@ class Connection:
     output: str
     target: str
     input: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+    def carried(self, value: Any) -> Any:
+        """Return what arrives: the value in the unit of the input."""
+        return self.factor * value + self.offset if self.converts else value
+
+    @property
+    def converts(self) -> bool:
+        """Whether its ends have different units."""
+        return self.factor != 1.0 or self.offset != 0.0
 
     def __str__(self) -> str:
         return f"{self.source}.{self.output} -> {self.target}.{self.input}"
@@ -119,6 +138,29 @@ class System:
             )
         return slave.name, variable
 
+    def full_name(self, name: str) -> str:
+        """Return ``slave.variable`` for a name, which need not name the slave where there is one."""
+        single = next(iter(self.slaves.values())) if len(self.slaves) == 1 else None
+        if single is not None and (single.has(name) or not name.startswith(f"{single.name}.")):
+            return f"{single.name}.{name}"
+        return name
+
+    def elements(self, name: str) -> list[str]:
+        """Return the elements of the array ``slave.variable``, in order; none for a scalar."""
+        slave, variable = self._owner(name)
+        if variable in slave.variable_names:
+            return []
+        return [f"{slave.name}.{e}" for e in slave.variable_names if e.startswith(f"{variable}[")]
+
+    @property
+    def arrays(self) -> dict[str, str]:
+        """Name of each output that is an element of an array -> the array's."""
+        return {
+            name: f"{slave.name}.{slave.outputs[port].array}"
+            for name, (slave, port) in self._outputs.items()
+            if slave.outputs[port].array
+        }
+
     def close(self) -> None:
         """Free everything the slaves hold."""
         for slave in self.slaves.values():
@@ -132,18 +174,14 @@ class System:
     def _connection(self, target: str, source: str) -> Connection:
         into, input_port = self._find(target, "input")
         out_of, output_port = self._find(source, "output")
-        if input_port.unit and output_port.unit and input_port.unit != output_port.unit:
-            raise MisfitError(
-                f"{source} is in {output_port.unit!r}, but {target} is in {input_port.unit!r}: convert one."
-            )
-        if input_port.kind != output_port.kind:
-            raise MisfitError(f"{source} carries {output_port.kind}, but {target} takes {input_port.kind}.")
+        factor, offset = _conversion(source, output_port, target, input_port)
+        _require_type(source, output_port, target, input_port)
         if input_port.discrete and not output_port.discrete:
             raise MisfitError(
                 f"{source} changes along flows, but {target} is a discrete input, which may change only at events: "
                 "sample the signal first."
             )
-        return Connection(out_of.name, output_port.name, into.name, input_port.name)
+        return Connection(out_of.name, output_port.name, into.name, input_port.name, factor, offset)
 
     def _refuse_doubles(self) -> None:
         driven: dict[tuple[str, str], Connection] = {}
@@ -193,6 +231,35 @@ class System:
         if name in ports:
             return []
         return [port[len(name) :] for port in ports if port.startswith(name + "[")]
+
+
+def _conversion(source: str, output: Port, target: str, input_: Port) -> tuple[float, float]:
+    """Return factor and offset from the unit of an output to that of an input.
+
+    Raises
+    ------
+    MisfitError
+        If both have units, and there is none.
+    """
+    if not output.unit or not input_.unit or output.unit == input_.unit:
+        return 1.0, 0.0
+    given, wanted = output.measure, input_.measure
+    if given is None or wanted is None or given.exponents != wanted.exponents or wanted.factor == 0.0:
+        why = (
+            "both are not declared in SI base units" if given is None or wanted is None else "they measure differently"
+        )
+        raise MisfitError(
+            f"{source} is in {output.unit!r}, but {target} is in {input_.unit!r}, and {why}: convert one."
+        )
+    return given.factor / wanted.factor, (given.offset - wanted.offset) / wanted.factor
+
+
+def _require_type(source: str, output: Port, target: str, input_: Port) -> None:
+    carries, takes = _TYPES[output.kind, output.whole], _TYPES[input_.kind, input_.whole]
+    alike = output.kind == input_.kind or {output.kind, input_.kind} == {"number", "truth"}
+    # Whole numbers may be truth values, which each value shows; fractions are none of either.
+    if not alike or (takes in ("whole numbers", "truth values") and carries == "numbers"):
+        raise MisfitError(f"{source} carries {carries}, but {target} takes {takes}.")
 
 
 def _number(places: Sequence[str]) -> str:

@@ -8,14 +8,18 @@ import shutil
 import sys
 from pathlib import Path
 
-from cosim.cli.exits import UsageError, exit_of, given_values, progress, write_csv
+from cosim.cli import run_files
+from cosim.cli.exits import UsageError, exit_of, given_values, progress
+from cosim.cli.run_files import RunFiles
 from cosim.consensus import fmu_system
-from cosim.errors import MisfitError
+from cosim.errors import CosimError, MisfitError
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
+from cosim.masters.changes import Curve, Given
 from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
+from cosim.tables.input_table import read_inputs
 from fmu.export import export_fmu
 from fmu.importer.temporary_folders import temporary_folder
 from fmu.importer.values import shown
@@ -60,11 +64,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a number, true or false, the name of an enumeration's item, text, or bytes in base 16; repeatable",
     )
     parser.add_argument(
-        "--output-file",
-        type=Path,
-        metavar="F.csv",
-        help="write all outputs over time, of event-exact runs with both rows of a jump",
+        "--input-file", type=Path, metavar="IN.csv", help="time, and inputs that nothing drives and tunable parameters"
     )
+    run_files.add_arguments(parser)
     parser.add_argument(
         "--no-validate", action="store_true", help="run an .fmu even if its description does not fit the schema"
     )
@@ -84,13 +86,9 @@ def run(options: argparse.Namespace) -> int:
             scenario = load_scenario(options.system)
             system, proposed = _agents(scenario, folder), scenario.stop_time
             _set_starts(system.slaves, starts)
-        result = _run(system, options, _given(options.stop_time, proposed))
+        return _run(system, options, _given(options.stop_time, proposed))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
-    if options.output_file:
-        write_csv(options.output_file, result.times, result.signals)
-    print(_text(result))
-    return exit_of(result.ended.name)
 
 
 def _given(option: float | None, *defaults: float | None) -> float | None:
@@ -128,15 +126,41 @@ def _owner(slaves: dict[str, Slave], name: str) -> tuple[Slave, str]:
     raise UsageError(f"--start-value {name} names no slave; the slaves are {', '.join(slaves)}.")
 
 
-def _run(system: System, options: argparse.Namespace, t_stop: float | None) -> CosimResult:
-    slaves = list(system.slaves.values())
-    # Agents of a scenario propose nothing of their own.
-    single = slaves[0] if len(slaves) == 1 else None
-    t_start = _given(options.start_time, single.default_start_time if single else None, 0.0)
+def _run(system: System, options: argparse.Namespace, t_stop: float | None) -> int:
+    t_start = _given(options.start_time, *(slave.default_start_time for slave in _single(system)), 0.0)
     if t_stop is None or t_start is None:
         raise UsageError(f"{options.system} proposes no stop time: give --stop-time.")
-    proposed = single.default_step if single else None
-    exact = all(slave.has_event_mode and slave.variable_step for slave in slaves)
+    inputs = read_inputs(options.input_file, system) if options.input_file else {}
+    files = RunFiles(options, system, t_stop)
+    try:
+        result = _master(system, options, (t_start, t_stop), inputs, files)
+    except (CosimError, KeyboardInterrupt):
+        if files.result is not None and options.output_file:
+            print(
+                f"  {options.output_file} has what there was up to t = {files.result.times[-1]:.9g} s", file=sys.stderr
+            )
+        raise
+    finally:
+        files.close()
+    print(_text(result))
+    return max(exit_of(result.ended.name), files.finish(result))
+
+
+def _single(system: System) -> list[Slave]:
+    """Return the slave of a system that has one: what it proposes is taken."""
+    slaves = list(system.slaves.values())
+    return slaves if len(slaves) == 1 else []
+
+
+def _master(
+    system: System, options: argparse.Namespace, span: tuple[float, float], inputs: dict[str, Given], files: RunFiles
+) -> CosimResult:
+    t_start, t_stop = span
+    slaves = list(system.slaves.values())
+    # Agents of a scenario propose nothing of their own.
+    proposed = next((slave.default_step for slave in _single(system)), None)
+    curves = any(isinstance(given, Curve) for given in inputs.values())
+    exact = not curves and all(slave.has_event_mode and slave.variable_step for slave in slaves)
     if (options.master or (EVENT_EXACT if exact else FIXED_STEP)) == FIXED_STEP:
         step = _given(options.step_size, proposed, _part(t_stop - t_start, STEP))
         assert step is not None
@@ -147,14 +171,24 @@ def _run(system: System, options: argparse.Namespace, t_stop: float | None) -> C
             t_start=t_start,
             record=system.output_names,
             output_interval=options.output_interval,
+            inputs=inputs,
+            watch=files.watch,
         )
     if options.step_size is not None:
         print("hybrid-fmu: --step-size is for the fixed-step master; this run is event-exact.", file=sys.stderr)
     # A step is proposed for masters that need short ones; here it is the output that it would make long.
     dense = proposed is not None and t_stop - t_start > MOST * proposed
     interval = _given(options.output_interval, None if dense else proposed, _part(t_stop - t_start, OUTPUT_INTERVAL))
-    rows = bool(options.output_file)
-    return run_event_exact(system, t_stop, t_start=t_start, output_interval=interval, record_events=rows)
+    rows = bool(options.output_file or options.plot or options.show_plot)
+    return run_event_exact(
+        system,
+        t_stop,
+        t_start=t_start,
+        output_interval=interval,
+        record_events=rows,
+        inputs=inputs,
+        watch=files.watch,
+    )
 
 
 def _part(length: float, wanted: float) -> float:

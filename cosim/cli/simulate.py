@@ -73,12 +73,28 @@ def _as_one(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[s
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
     end = float(arc.t[-1])
     times = np.minimum(np.arange(int(np.ceil(end / interval)) + 1) * interval, end)
+    jumps = np.unique([jump.t for jump in arc.jumps])
+    times = np.union1d(times, jumps)
     names = [f"{agent_name(i)}.{item}" for i in range(1, scenario.network.agents + 1) for item in ("x", "broadcast")]
-    return run_report(scenario, arc), times.tolist(), {name: arc.at(name, times).tolist() for name in names}
+    # Both rows of a jump: where something has one, its value before comes first.
+    rows, before = _both_sides(times, np.isin(times, jumps))
+    signals = {name: np.where(before, arc.at(name, rows, before=True), arc.at(name, rows)).tolist() for name in names}
+    return run_report(scenario, arc), rows.tolist(), signals
+
+
+def _both_sides(times: Any, jumps: Any) -> tuple[Any, Any]:
+    """Return the times with those of jumps twice, and which rows are before a jump."""
+    counts = 1 + jumps
+    rows = np.repeat(times, counts)
+    before = np.zeros(rows.size, dtype=bool)
+    before[(np.cumsum(counts) - counts)[jumps]] = True
+    return rows, before
 
 
 def _as_network(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[str, Any]]:
-    result = run_event_exact(in_process_system(scenario), scenario.stop_time, output_interval=interval)
+    result = run_event_exact(
+        in_process_system(scenario), scenario.stop_time, output_interval=interval, record_events=True
+    )
     signals = {name: values for name, values in result.signals.items() if name.endswith((".x", ".broadcast"))}
     return network_report(scenario, result), result.times, signals
 

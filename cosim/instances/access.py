@@ -105,9 +105,13 @@ class FmuAccess:
         except CosimError as error:
             raise CosimError(f"{error} It was to set {name!r} to {value!r}.") from error
 
-    def forget(self) -> None:
-        """Forget what arrays hold: the FMU has gone to another state."""
-        self._arrays.clear()
+    def held(self) -> dict[str, list[Any]]:
+        """Return what is known of arrays, to be `recalled` with the FMU's state of now."""
+        return {name: list(values) for name, values in self._arrays.items()}
+
+    def recall(self, held: dict[str, list[Any]]) -> None:
+        """Know of arrays what was known when the FMU had the state that it has returned to."""
+        self._arrays = {name: list(values) for name, values in held.items()}
 
     def _whole(self, variable: Any) -> list[Any]:
         """Return the elements of an array, read once: FMI 3.0.2 section 4.2 wants a step between set and get."""

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from cosim.slave import Port
+from cosim.slave import Measure, Port
 from fmu.standard.value_types import DISCRETE, INTEGERS, TYPES
 
-KINDS = {"String": "text", "Binary": "bytes"}
+KINDS = {"String": "text", "Binary": "bytes", "Boolean": "truth"}
 """What ports of these types carry; those of all others carry numbers."""
 STRUCTURAL = "structuralParameter"
+_BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 class FmuVariables:
@@ -29,6 +30,7 @@ class FmuVariables:
     """
 
     def __init__(self, description: Any) -> None:
+        self._measures = {unit.name: _measure(unit.baseUnit) for unit in description.unitDefinitions or ()}
         self._variables = [variable for variable in description.modelVariables if variable.type in TYPES]
         # Arrays have the sizes that structural parameters say.
         self._sizes = {
@@ -80,5 +82,14 @@ class FmuVariables:
         discrete = variable.variability == "discrete" or variable.type in DISCRETE
         declared = variable.declaredType
         unit = variable.unit or (declared.unit if declared else None) or ""
+        array = variable.name if variable.dimensions else ""
+        kind, whole = KINDS.get(variable.type, "number"), variable.type in INTEGERS
         for name in self._names(variable):
-            yield Port(name, unit, discrete, KINDS.get(variable.type, "number"))
+            yield Port(name, unit, discrete, kind, whole, array, self._measures.get(unit))
+
+
+def _measure(base: Any) -> Measure | None:
+    if base is None:
+        return None
+    exponents = tuple(int(getattr(base, name) or 0) for name in _BASE_UNITS)
+    return Measure(exponents, float(base.factor or 1.0), float(base.offset or 0.0))

@@ -12,8 +12,14 @@ from cosim.errors import MisfitError
 from cosim.system import System
 from hybrid_model import Signal
 
-Given = float | Signal
-"""A number for the whole run, or a `Signal`, which is asked at the start and at its breakpoints, and held between."""
+
+class Curve(Signal):
+    """A signal that changes between its breakpoints too: masters that exchange continuous signals follow it."""
+
+
+Given = float | str | bytes | Signal
+"""A value for the whole run; a `Signal`, which is asked at the start and at its breakpoints, and held between; or a
+`Curve`."""
 
 ROUNDING = 1e-12
 """Part of a time by which a breakpoint may lie after a communication point and still be at it."""
@@ -42,6 +48,7 @@ class Changes:
         self._places = {name: system.settable(name) for name in given}
         self._given = dict(given)
         self._t_start = t_start
+        self._curves = [name for name, value in given.items() if isinstance(value, Curve)]
         later: list[tuple[float, str]] = []
         for name, value in given.items():
             for time in value.breakpoints if isinstance(value, Signal) else ():
@@ -69,6 +76,12 @@ class Changes:
             due.setdefault(self._places[name][0], []).append(name)
         return due
 
+    def arrive(self, t: float) -> None:
+        """Set what has changed up to time `t` in s, and the curves."""
+        for names in self.take(t).values():
+            self.set(names, t)
+        self.set(self._curves, t)
+
     def set(self, names: list[str], t: float) -> None:
         """Set variables to their values at time `t` in s."""
         for name in names:
@@ -77,7 +90,8 @@ class Changes:
     def _set(self, name: str, t: float) -> None:
         slave, variable = self._places[name]
         given = self._given[name]
-        value = given.value(self._since(given, t)) if isinstance(given, Signal) else given
+        asked = t if isinstance(given, Curve) else self._since(given, t) if isinstance(given, Signal) else t
+        value = given.value(asked) if isinstance(given, Signal) else given
         if np.shape(value) != ():
             raise MisfitError(f"{name} is given {value!r} at t = {t:.9g} s: give one number, element by element.")
         self._system.slaves[slave].set(variable, cast(float, value))

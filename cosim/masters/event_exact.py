@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Mapping
 
 from cosim.errors import CosimError, MisfitError
-from cosim.masters.changes import Changes, Given
+from cosim.masters.changes import Changes, Curve, Given
 from cosim.masters.start import outputs, require_times, sample_change, sample_end, start_slaves
-from cosim.result import CosimResult
+from cosim.result import CosimResult, Watch
 from cosim.system import System
 from hybrid_model.errors import SchedulingError
 from hybrid_model.schedule.scheduler import Scheduler
@@ -25,6 +25,7 @@ def run_event_exact(
     output_interval: float | None = None,
     record_events: bool = False,
     inputs: Mapping[str, Given] | None = None,
+    watch: Watch | None = None,
 ) -> CosimResult:
     """Run a system whose slaves exchange discrete signals only, each event at its exact time.
 
@@ -42,6 +43,8 @@ def run_event_exact(
     inputs : mapping, optional
         ``"slave.variable"`` -> number or `hybrid_model.Signal`, for inputs that nothing drives and tunable parameters.
         A signal is asked at the start and at its breakpoints, each of which is an event, and held between.
+    watch : callable, optional
+        Told of the run after each row; see `CosimResult.watch`.
 
     Returns
     -------
@@ -58,20 +61,21 @@ def run_event_exact(
     require_times(t_start, t_stop, output_interval, "output interval")
     _require_discrete(system)
     changes = Changes(system, inputs or {}, t_start)
-    result = CosimResult(t=t_start)
+    _refuse_curves(inputs or {})
+    result = CosimResult(t=t_start, watch=watch)
 
     def row(t: float) -> None:
         sample_change(system, result, t, system.output_names)
 
-    watch = row if record_events and output_interval is not None else None
-    scheduler = Scheduler(system.slaves, system.from_slave, t_start, watch=watch)
+    at_events = row if record_events and output_interval is not None else None
+    scheduler = Scheduler(system.slaves, system.from_slave, t_start, watch=at_events)
     result.ticks, result.events = scheduler.ticks, scheduler.events
     try:
         start_slaves(system, t_start, t_stop, events=True, changes=changes)
         scheduler.handle_events(t_start, system.slaves)
         if output_interval is not None:
             sample_end(system, result, t_start, system.output_names)
-        _advance(scheduler, system, result, t_stop, output_interval, changes, watch)
+        _advance(scheduler, system, result, t_stop, output_interval, changes, at_events)
         if scheduler.ended and output_interval is not None:
             sample_end(system, result, scheduler.ended[1], system.output_names)
         result.final = outputs(system)
@@ -124,6 +128,15 @@ def _change_on_the_way(
         scheduler.handle_events(due, changed)
         if watch:
             watch(due)
+
+
+def _refuse_curves(inputs: Mapping[str, Given]) -> None:
+    curve = next((name for name, given in inputs.items() if isinstance(given, Curve)), None)
+    if curve is not None:
+        raise MisfitError(
+            f"{curve} is given as a curve, but this master sets inputs at events only: use the fixed-step master, or "
+            "give a Signal."
+        )
 
 
 def _require_discrete(system: System) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Given
 from cosim.masters.start import outputs, require_times, sample_end, start_slaves
-from cosim.result import CosimResult
+from cosim.result import CosimResult, Watch
 from cosim.system import System
 
 ROUNDING = 1e-9
@@ -24,6 +24,7 @@ def run_fixed_step(
     record: Sequence[str] = (),
     output_interval: float | None = None,
     inputs: Mapping[str, Given] | None = None,
+    watch: Watch | None = None,
 ) -> CosimResult:
     """Run a system with a fixed communication step; slaves handle their events inside.
 
@@ -45,7 +46,9 @@ def run_fixed_step(
     inputs : mapping, optional
         ``"slave.variable"`` -> number or `hybrid_model.Signal`, for inputs that nothing drives and tunable parameters.
         A signal is asked at the start and at its breakpoints, and its values arrive at the communication point there
-        or, where there is none, at the next.
+        or, where there is none, at the next. A `Curve` is asked at each communication point.
+    watch : callable, optional
+        Told of the run after each row; see `CosimResult.watch`.
 
     Returns
     -------
@@ -67,15 +70,13 @@ def run_fixed_step(
     _require_constant(system, t_stop - t_start, count, step)
     every = 1 if output_interval is None else _steps_between(output_interval, step)
     changes = Changes(system, inputs or {}, t_start)
-    result = CosimResult(t=t_start)
+    result = CosimResult(t=t_start, watch=watch)
     try:
         start_slaves(system, t_start, t_stop, events=False, changes=changes)
         recorded, exchange = system.reader(record), _Exchange(system)
 
         def keep(t: float) -> None:
-            result.times.append(t)
-            for name, value in zip(record, recorded(), strict=True):
-                result.signals.setdefault(name, []).append(value)
+            result.keep(t, record, recorded())
 
         keep(t_start)
         # Time by index: adding up steps would drift (rule 9).
@@ -86,8 +87,7 @@ def run_fixed_step(
             if k % every == 0 or k == count:
                 keep(result.t)
             exchange()
-            for names in changes.take(result.t).values():
-                changes.set(names, result.t)
+            changes.arrive(result.t)
         result.final = outputs(system)
     finally:
         system.close()
@@ -112,10 +112,13 @@ class _Exchange:
         self._read = system.reader([f"{c.source}.{c.output}" for c in system.connections])
         self._inputs = [(system.slaves[c.target], c.input) for c in system.connections]
         self._sent: list[object] = [None] * len(self._inputs)
+        self._converted = [(k, c.carried) for k, c in enumerate(system.connections) if c.converts]
 
     def __call__(self) -> None:
         # Read everything before writing anything: the order of slaves must not matter.
         values = self._read()
+        for k, carried in self._converted:
+            values[k] = carried(values[k])
         if values == self._sent:
             return
         for (slave, name), value, before in zip(self._inputs, values, self._sent, strict=True):

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from cosim.errors import CosimError
 from cosim.masters.changes import Changes
 from cosim.result import CosimResult
-from cosim.system import System
+from cosim.system import Connection, System
 
 MOST_STEPS = 100_000_000
 """Most steps of one run."""
@@ -53,9 +53,7 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool,
     known: dict[tuple[str, str], float] = {}
     # A chain of n slaves needs n rounds, and one more to see that nothing changes.
     for _ in range(len(system.slaves) + 1):
-        changed = [
-            c for c in system.connections if transfer_start(system, c.target, c.input, c.source, c.output, known)
-        ]
+        changed = [c for c in system.connections if transfer_start(system, c, known)]
         if not changed:
             break
     else:
@@ -64,11 +62,10 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool,
         slave.begin()
 
 
-def transfer_start(
-    system: System, target: str, input_: str, source: str, output: str, known: dict[tuple[str, str], float]
-) -> bool:
+def transfer_start(system: System, connection: Connection, known: dict[tuple[str, str], float]) -> bool:
     """Transfer one start value; return whether it was news to the input."""
-    value = system.slaves[source].get(output)
+    target, input_, source, output = connection.target, connection.input, connection.source, connection.output
+    value = connection.carried(system.slaves[source].get(output))
     if known.get((target, input_)) == value:
         return False
     known[target, input_] = value
@@ -78,9 +75,7 @@ def transfer_start(
 
 def sample(system: System, result: CosimResult, t: float, names: Sequence[str]) -> None:
     """Append the named outputs at `t` to the result."""
-    result.times.append(t)
-    for name in names:
-        result.signals.setdefault(name, []).append(system.get(name))
+    result.keep(t, names, [system.get(name) for name in names])
 
 
 def sample_end(system: System, result: CosimResult, t: float, names: Sequence[str]) -> None:

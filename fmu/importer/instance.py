@@ -25,6 +25,8 @@ _CLASSES = {
     (3, "ModelExchange"): FMU3Model,
 }
 
+_PLAIN: dict[str, Callable[[Any], Any]] = {"Boolean": bool, "String": lambda text: text.decode("utf-8")}
+
 
 class VersionError(ValueError):
     """An FMU is asked for a function that its version of the standard does not have."""
@@ -132,6 +134,9 @@ class FmuInstance:
     def getter(self, variable: Any, size: int) -> Getter:
         """Return what reads a variable of `size` elements."""
         found = self.function(f"Get{accessor(variable.type, self.major)}")
+        if self.major == 2 and variable.type in _PLAIN:
+            # Of these fmpy returns what they are in C.
+            found = _converted(found, _PLAIN[variable.type])
         return found, ([variable.valueReference], *(() if self.major == 2 else (size,)))
 
     def numbers(self, variables: Sequence[Any], sizes: Sequence[int]) -> Callable[[], Any]:
@@ -216,6 +221,10 @@ class FmuInstance:
         getattr(self.fmu, spelled(self.major, "FreeInstance"))(self.fmu.component)
         if self._callbacks is not None:
             self._callbacks.release()
+
+
+def _converted(function: Callable[..., list[Any]], convert: Callable[[Any], Any]) -> Callable[..., list[Any]]:
+    return lambda *arguments: [convert(value) for value in function(*arguments)]
 
 
 def _require_success(function: str, status: int) -> None:

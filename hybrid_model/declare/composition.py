@@ -36,6 +36,10 @@ class ElementWire:
     target: str
     input: str
 
+    def carried(self, value: float) -> float:
+        """Return what arrives of a value: both ends have one unit."""
+        return value
+
     def __str__(self) -> str:
         return f"{self.source}.{self.output} -> {self.target}.{self.input}"
 

@@ -15,7 +15,7 @@ import heapq
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from hybrid_model.errors import SchedulingError
 from hybrid_model.scales import one_instant
@@ -39,6 +39,9 @@ class Wire(Protocol):
     @property
     def input(self) -> str:
         """Input of that block."""
+
+    def carried(self, value: Any) -> Any:
+        """Return what arrives of a value that leaves."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +124,7 @@ class Scheduler:
         self._watch = watch
         self._places = {name: _Place(block, k, t_start, t_start) for k, (name, block) in enumerate(blocks.items())}
         self._unpredictable: set[str] = set()
+        self._arrived: dict[tuple[str, str], Any] = {}
         self._queue: list[tuple[float, int, int, str]] = []
 
     def advance_to(self, limit: float) -> None:
@@ -206,10 +210,14 @@ class Scheduler:
         receivers: set[str] = set()
         sender = self._places[name].block
         for wire in self._wires_from(name):
-            value = sender.get(wire.output)
-            place = self._places[wire.target]
-            if place.block.get(wire.input) == value:
+            value = wire.carried(sender.get(wire.output))
+            place, at = self._places[wire.target], (wire.target, wire.input)
+            # An input is read once: what it holds later is what was sent to it.
+            if at not in self._arrived:
+                self._arrived[at] = place.block.get(wire.input)
+            if self._arrived[at] == value:
                 continue
+            self._arrived[at] = value
             if wire.target not in touched and wire.target not in receivers:
                 self._require_behind(place, t, name)
                 self._bring(place, t)

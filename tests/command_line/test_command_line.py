@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import sys
+from itertools import pairwise
 
 import pytest
 from small_scenario import small_scenario
@@ -47,7 +48,11 @@ def test_simulate_writes_run_and_trajectory(small, tmp_path, capsys):
     assert json.loads((tmp_path / "out" / "run.json").read_text())["scenario"] == "small"
     with (tmp_path / "out" / "trajectory.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert [float(row["time"]) for row in rows] == pytest.approx([*(0.1 * k for k in range(11)), 1.05])
+    times = [float(row["time"]) for row in rows]
+    # Beside the grid there are both rows of each broadcast.
+    twice = {t for t, after in pairwise(times) if t == after}
+    assert [t for t in times if t not in twice] == pytest.approx([*(0.1 * k for k in range(11)), 1.05])
+    assert len(twice) >= 3
     assert float(rows[0]["agent1.x"]) == 1.0
 
 
@@ -94,7 +99,7 @@ def test_export_of_a_class_and_run_of_its_fmu(tmp_path, capsys):
     with table.open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 11
-    assert float(rows[-1]["Integrator.x"]) == 3.0
+    assert float(rows[-1]["x"]) == 3.0
 
 
 def test_the_table_of_a_cosimulation_has_both_rows_of_a_jump(tmp_path, capsys):
@@ -106,7 +111,7 @@ def test_the_table_of_a_cosimulation_has_both_rows_of_a_jump(tmp_path, capsys):
     before, after = rows[5:7]
     assert len(rows) == 11 + 2
     assert before["time"] == after["time"] == pytest.approx((2 / 9.81) ** 0.5, abs=1e-9)
-    assert after["ball.v"] == -0.7 * before["ball.v"] > 0.0
+    assert after["v"] == -0.7 * before["v"] > 0.0
 
 
 def test_a_scenario_exports_one_fmu_an_agent(small, tmp_path, capsys):

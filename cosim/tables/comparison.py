@@ -1,0 +1,125 @@
+"""A run beside a table of reference: how far each variable is from it."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import MisfitError
+
+WORDS = {"true": 1.0, "false": 0.0}
+ROUNDING = 1e-9
+"""Part of a time by which rows may differ and still be of one time."""
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far a variable is from its reference.
+
+    Attributes
+    ----------
+    name : str
+    largest : float
+        Largest difference, as a part of the largest value of the reference; 1 for texts that differ.
+    t : float
+        Where, in s.
+    """
+
+    name: str
+    largest: float
+    t: float
+
+
+def deviations(
+    path: str | Path, times: Sequence[float], signals: Mapping[str, Sequence[Any]]
+) -> tuple[list[Deviation], list[str]]:
+    """Compare a run with a table.
+
+    At each time of the table within the run the run's value is its own there, linear between its rows; where it jumps
+    at that time, the side that is nearer.
+
+    Parameters
+    ----------
+    path : str or Path
+        Comma-separated values: ``time``, and names of variables; vectors with their elements separated by blanks.
+    times : sequence of float
+        Of the run, in s.
+    signals : mapping
+        Name in the table -> values of the run, for vectors ``name[1]`` and so on.
+
+    Returns
+    -------
+    found : list of Deviation
+        One a scalar of the table.
+    missing : list of str
+        Columns of the table that the run has not.
+
+    Raises
+    ------
+    MisfitError
+        If the file is no table, or the run and the table have no variable or no time in common.
+    """
+    with Path(path).open(newline="", encoding="utf-8-sig") as file:
+        rows = [row for row in csv.reader(file) if row]
+    if len(rows) < 2 or rows[0][0].strip().strip('"') != "time":
+        raise MisfitError(f"{path} is no table with a line of names that begins with time: give one.")
+    names = [name.strip().strip('"') for name in rows[0]]
+    if any(len(row) != len(names) for row in rows):
+        raise MisfitError(f"{path} has rows of another length than its line of names.")
+    grid, here = np.array([float(row[0]) for row in rows[1:]]), np.array(times)
+    if not times or grid[0] > here[-1] * (1.0 + ROUNDING) or grid[-1] < here[0]:
+        raise MisfitError(f"{path} and the run have no time in common.")
+    within = (grid >= here[0]) & (grid <= here[-1] + ROUNDING * abs(here[-1]))
+    found: list[Deviation] = []
+    missing: list[str] = []
+    for k, name in enumerate(names[1:], start=1):
+        texts = [row[k] for row, inside in zip(rows[1:], within, strict=True) if inside]
+        elements = _elements(name, texts, signals)
+        missing += [] if elements else [name]
+        found += [_deviation(element, grid[within], of_it, here, signals[element]) for element, of_it in elements]
+    if not found:
+        raise MisfitError(f"{path} has none of the columns {', '.join(signals)}.")
+    return found, missing
+
+
+def _elements(name: str, texts: list[str], signals: Mapping[str, Sequence[Any]]) -> list[tuple[str, list[str]]]:
+    if name in signals:
+        return [(name, texts)]
+    elements = [element for element in signals if element.startswith(f"{name}[")]
+    rows = [text.split() for text in texts]
+    if any(len(row) != len(elements) for row in rows):
+        return []
+    return [(element, [row[k] for row in rows]) for k, element in enumerate(elements)]
+
+
+def _deviation(name: str, grid: Any, texts: list[str], here: Any, values: Sequence[Any]) -> Deviation:
+    if isinstance(values[0], (str, bytes)):
+        shown = [value.hex() if isinstance(value, bytes) else value for value in values]
+        at = np.clip(np.searchsorted(here, grid * (1.0 + ROUNDING), side="right") - 1, 0, None)
+        wrong = [t for t, k, text in zip(grid, at, texts, strict=True) if shown[k] != text]
+        return Deviation(name, float(bool(wrong)), float(wrong[0]) if wrong else float(grid[0]))
+    wanted = np.array([WORDS.get(text.lower()) if text.lower() in WORDS else float(text) for text in texts])
+    run = np.array([float(value) for value in values])
+    low, high = _sides(grid, here, run)
+    apart = np.where(
+        (low <= wanted) & (wanted <= high) & (low == high), 0.0, np.minimum(abs(low - wanted), abs(high - wanted))
+    )
+    scale = float(np.max(np.abs(wanted))) or 1.0
+    k = int(np.argmax(apart))
+    return Deviation(name, float(apart[k]) / scale, float(grid[k]))
+
+
+def _sides(grid: Any, here: Any, run: Any) -> tuple[Any, Any]:
+    """Return the values of a run on both sides of times; between rows it is linear, so both are one."""
+    slack = ROUNDING * np.maximum(np.abs(grid), here[-1] - here[0])
+    first = np.searchsorted(here, grid - slack, side="left")
+    last = np.searchsorted(here, grid + slack, side="right") - 1
+    at_row = last >= first
+    between = np.interp(grid, here, run)
+    first, last = np.clip(first, 0, len(here) - 1), np.clip(last, 0, len(here) - 1)
+    return np.where(at_row, run[first], between), np.where(at_row, run[last], between)

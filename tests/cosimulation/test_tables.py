@@ -1,0 +1,200 @@
+"""Inputs from files, rows as they come, comparison with a reference, pictures: `hybrid-fmu cosim` and its files."""
+
+import csv
+import math
+
+import numpy as np
+import pytest
+
+from cosim.cli.main import main
+from cosim.errors import CosimError, MisfitError
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_fixed_step
+from cosim.result import CosimResult
+from cosim.system import System
+from cosim.tables.comparison import deviations
+from cosim.tables.input_table import Polyline, Staircase, read_inputs
+from cosim.tables.row_file import Columns, RowFile
+
+
+@pytest.fixture
+def echo(stranger):
+    """A stranger without events of its own, and a way to write a table."""
+    return stranger(experiment='stopTime="2" stepSize="0.5"', events=False)
+
+
+def written(path, text):
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def columns(path):
+    with path.open(newline="") as file:
+        names, *rows = csv.reader(file)
+    return {name: [row[k] for row in rows] for k, name in enumerate(names)}
+
+
+def test_inputs_of_all_types_arrive_exactly(echo, tmp_path):
+    table = written(
+        tmp_path / "in.csv",
+        "time,int64_in,uint64_in,boolean_in,string_in,enumeration_in,float64_in\n"
+        "0,-9223372036854775808,0,false,a b,low,0\n"
+        "1,9223372036854775807,18446744073709551615,true,c,high,2\n",
+    )
+    out = tmp_path / "out.csv"
+    assert main(["cosim", str(echo), "--input-file", str(table), "--output-file", str(out)]) == 0
+    found = columns(out)
+    assert found["time"] == ["0.0", "0.5", "1.0", "1.5", "2.0"]
+    # A step shows what was set before it.
+    assert found["int64_out"] == ["-9223372036854775808"] * 3 + ["9223372036854775807"] * 2
+    assert found["uint64_out"][-1] == "18446744073709551615"
+    assert found["string_out"] == ["a b"] * 3 + ["c"] * 2
+    assert found["enumeration_out"][-1] == "7"
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("time,int8_in\n0,200\n", "stranger.int8_in is set to 200, but it is an Int8"),
+        ("time,int8_in\n0,x\n", "stranger.int8_in is set to 'x'"),
+        ("time,nobody\n0,1\n", "stranger.nobody is neither an input nor a tunable parameter"),
+        ("time,int8_in\n1,1\n0,1\n", "row 3: the time 0 s comes after 1 s"),
+        ("time,int8_in\n0\n", "row 2: it has 1 fields, but there are 2 names"),
+        ("time,int8_in\nnan,1\n", "row 2: the time 'nan' is no finite number"),
+        ("int8_in,time\n0,1\n", "begins with time"),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused(text, sentence, echo, tmp_path, capsys):
+    table = written(tmp_path / "in.csv", text)
+    assert main(["cosim", str(echo), "--input-file", str(table)]) == 1
+    assert sentence in capsys.readouterr().err
+
+
+def test_lines_and_stairs_jump_where_a_time_comes_twice():
+    line, stairs = Polyline((0.0, 1.0, 1.0, 2.0), (0.0, 2.0, 5.0, 6.0)), Staircase((0.0, 1.0, 2.0), (1, 1, 3))
+    assert [line(t) for t in (-1.0, 0.0, 0.5, 1.0, 1.5, 3.0)] == [0.0, 0.0, 1.0, 5.0, 5.5, 6.0]
+    assert line.jumps == [1.0]
+    assert [stairs(t) for t in (-1.0, 0.0, 1.9, 2.0, 9.0)] == [1, 1, 1, 3, 3]
+    assert stairs.jumps == [2.0]
+
+
+def test_an_input_that_is_driven_cannot_come_from_a_table(echo, tmp_path):
+    system = System([FmuSlave("a", echo), FmuSlave("b", echo)], {"b.int8_in": "a.int8_out"})
+    table = written(tmp_path / "in.csv", "time,b.int8_in\n0,1\n")
+    with pytest.raises(MisfitError, match=r"b.int8_in cannot be given a value, for a.int8_out -> b.int8_in drives it"):
+        read_inputs(table, system)
+
+
+def test_a_vector_is_one_column():
+    table = Columns(["a.y[1]", "a.y[2]", "a.z"], {"a.y[1]": "a.y", "a.y[2]": "a.y"}, {"a.y": "y"})
+    assert table.names == ["y", "a.z"]
+    assert table.cells([1.0, 0.1, True]) == ["1.0 0.1", 1]
+
+
+def test_rows_are_there_while_the_run_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.tables.row_file.AT_ONCE", -1.0)
+    rows, result = RowFile(tmp_path / "new" / "out.csv", Columns(["x"], {}, {})), CosimResult()
+    result.watch = rows.take
+    result.keep(0.0, ["x"], [1.5])
+    assert (tmp_path / "new" / "out.csv").read_bytes() == b"time,x\r\n0.0,1.5\r\n"
+    rows.close()
+
+
+def test_a_full_disk_leaves_whole_lines(tmp_path, monkeypatch):
+    monkeypatch.setattr("cosim.tables.row_file.AT_ONCE", -1.0)
+    rows, result = RowFile(tmp_path / "out.csv", Columns(["x"], {}, {})), CosimResult()
+    result.watch = rows.take
+    result.keep(0.0, ["x"], [1.0])
+    file = rows._file
+
+    class Full:
+        """A disk with room for five more bytes."""
+
+        room = 5
+
+        def write(self, content):
+            if not self.room:
+                raise OSError(28, "No space left on device")
+            room, self.room = self.room, 0
+            return file.write(content[:room])
+
+        def fileno(self):
+            return file.fileno()
+
+        def close(self):
+            file.close()
+
+    rows._file = Full()
+    with pytest.raises(CosimError, match=r"out\.csv cannot be written any further at t = 1 s: No space left"):
+        result.keep(1.0, ["x"], [123456.0])
+    rows._file.close()
+    assert (tmp_path / "out.csv").read_bytes() == b"time,x\r\n0.0,1.0\r\n"
+
+
+def test_what_there_is_stays_when_an_fmu_fails(stranger, tmp_path, capsys):
+    out = tmp_path / "out.csv"
+    table = written(tmp_path / "in.csv", "time,int8_in\n0,1\n1.05,1\n1.1,2\n")
+    path = stranger(events=False, experiment='stopTime="2" stepSize="0.1"')
+    slave = FmuSlave("stranger", path)
+    inputs = read_inputs(table, System([slave], {}))
+
+    def fail(result):
+        if result.times[-1] > 1.0:
+            raise CosimError("enough")
+
+    with pytest.raises(CosimError, match="enough"):
+        run_fixed_step(System([slave], {}), 2.0, 0.1, record=["stranger.x"], inputs=inputs, watch=fail)
+    code = main(["cosim", str(path), "--start-value", "behaviour=5", "--output-file", str(out)])
+    assert code == 1
+    assert f"{out} has what there was up to t = 0 s" in capsys.readouterr().err
+    assert columns(out)["time"] == ["0.0"]
+
+
+def test_a_run_is_compared_with_a_table(echo, tmp_path, capsys):
+    out = tmp_path / "out.csv"
+    assert main(["cosim", str(echo), "--output-file", str(out)]) == 0
+    assert main(["cosim", str(echo), "--reference-file", str(out)]) == 0
+    assert "x differs from out.csv by 0 of its size" in capsys.readouterr().out
+    off = written(tmp_path / "off.csv", "time,x,unknown\n0,0,0\n0.5,0.51,0\n")
+    assert main(["cosim", str(echo), "--reference-file", str(off)]) == 1
+    said = capsys.readouterr().out
+    assert "x differs from off.csv by 0.0196 of its size, at 0.5 s: beyond 0.001" in said
+    assert "not compared, as the run has none of that form: unknown" in said
+    assert main(["cosim", str(echo), "--reference-file", str(off), "--reference-tolerance", "0.02"]) == 0
+
+
+def test_at_a_jump_either_side_is_right_and_texts_are_compared(tmp_path):
+    table = written(tmp_path / "ref.csv", "time,x,s,v\n0,0,a,1 2\n1,5,a,1 2\n1.5,5.5,b,1 2\n")
+    signals = {"x": [0.0, 1.0, 5.0, 6.0], "s": ["a", "a", "b", "b"], "v[1]": [1.0] * 4, "v[2]": [2.0, 2.0, 2.0, 2.5]}
+    found, missing = deviations(table, [0.0, 1.0, 1.0, 2.0], signals)
+    assert missing == []
+    largest = {deviation.name: deviation.largest for deviation in found}
+    assert largest["x"] == 0.0
+    assert largest["s"] == 1.0
+    assert largest["v[2]"] == pytest.approx(0.125)
+    with pytest.raises(MisfitError, match="no time in common"):
+        deviations(table, [3.0, 4.0], {"x": [0.0, 0.0]})
+
+
+def test_events_are_logged_and_outputs_drawn(stranger, tmp_path):
+    log, picture = tmp_path / "events.csv", tmp_path / "run.png"
+    command = ["cosim", str(stranger()), "--start-value", "rate=2", "--event-log", str(log), "--plot", str(picture)]
+    assert main(command) == 0
+    assert columns(log) == {"time": ["0.5", "1.0", "1.5", "2.0"], "component": ["stranger"] * 4, "clocks": [""] * 4}
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_trajectory_of_a_scenario_has_both_rows_of_a_jump(tmp_path):
+    for engine in ("automaton", "network"):
+        folder = tmp_path / engine
+        command = ["simulate", "paper-a", "--stop-time", "2", "--engine", engine, "--out", str(folder)]
+        assert main(command) == 0
+        table = columns(folder / "trajectory.csv")
+        times = np.array(table["time"], dtype=float)
+        sent = np.array([table[f"agent{i}.broadcast"] for i in range(1, 5)], dtype=float)
+        twice = np.flatnonzero(np.diff(times) == 0.0)
+        assert twice.size >= 2
+        # Broadcasts are constant but for the second rows.
+        changed = np.flatnonzero(np.any(np.diff(sent) != 0.0, axis=0))
+        assert set(changed) <= set(twice)
+        assert math.isclose(times[-1], 2.0)
