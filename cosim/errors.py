@@ -7,3 +7,7 @@ class CosimError(RuntimeError):
 
 class MisfitError(CosimError, ValueError):
     """Signals do not fit together, or a master cannot treat them exactly."""
+
+
+class UsageError(ValueError):
+    """A command was given something that it does not know."""

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import hybrid_model as hm
-from cosim.cli.exits import Exit, UsageError, exit_of, progress
+from cosim.cli.exits import Exit, exit_of, progress
+from cosim.errors import UsageError
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.forms import Certified, Quantity
 from hybrid_model.consensus.figures.conservatism import save_certificate_figures

@@ -6,19 +6,22 @@ import argparse
 import math
 import shutil
 import sys
+from dataclasses import fields
 from pathlib import Path
 
 from cosim.cli import run_files
-from cosim.cli.exits import UsageError, exit_of, given_values, progress
+from cosim.cli.exits import exit_of, given_values, progress
 from cosim.cli.run_files import RunFiles
 from cosim.consensus import fmu_system
-from cosim.errors import CosimError, MisfitError
-from cosim.fmu_slave import FmuSlave
+from cosim.errors import CosimError, UsageError
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
 from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
+from cosim.systems.assembly import assemble
+from cosim.systems.definition import Experiment
+from cosim.systems.files import read_system
 from cosim.tables.input_table import read_inputs
 from fmu.export import export_fmu
 from fmu.importer.temporary_folders import temporary_folder
@@ -33,15 +36,17 @@ STEP, OUTPUT_INTERVAL = 0.01, 0.1
 """In s: the communication step and the spacing of the output where nobody proposes one, if they fit into the run."""
 FEWEST, MOST = 10, 100_000
 """Steps of a run where nobody proposes their length."""
-EVENT_EXACT, FIXED_STEP = "event-exact", "fixed-step"
+EVENT_EXACT, FIXED_STEP = MASTERS = "event-exact", "fixed-step"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    parser.add_argument("system", metavar="SYSTEM", help="name of a preset, path of a TOML file, or an .fmu")
+    parser.add_argument(
+        "system", metavar="SYSTEM", help="an .fmu, a system's .toml, a folder with either, or a scenario"
+    )
     parser.add_argument(
         "--master",
-        choices=(EVENT_EXACT, FIXED_STEP),
+        choices=MASTERS,
         help="default: event-exact; fixed-step for an .fmu without event mode (FMI 2.0) or with steps of one length",
     )
     parser.add_argument("--start-time", type=float, help="start of the run in s; default: what an .fmu proposes, or 0")
@@ -78,22 +83,36 @@ def run(options: argparse.Namespace) -> int:
     starts = given_values(options.start_value)
     folder = temporary_folder()
     try:
-        if Path(options.system).suffix.lower() == ".fmu":
-            slave: Slave = FmuSlave(Path(options.system).stem, options.system, validate=not options.no_validate)
-            _set_starts({slave.name: slave}, starts)
-            system, proposed = System([slave], {}), slave.default_stop_time
-        else:
+        definition = read_system(options.system)
+        if definition is None:
             scenario = load_scenario(options.system)
-            system, proposed = _agents(scenario, folder), scenario.stop_time
-            _set_starts(system.slaves, starts)
-        return _run(system, options, _given(options.stop_time, proposed))
+            system, experiment = _agents(scenario, folder), Experiment(stop_time=scenario.stop_time)
+        else:
+            system, experiment = assemble(definition, validate=not options.no_validate), definition.experiment
+            options.input_file = options.input_file or definition.inputs
+        _set_starts(system.slaves, starts)
+        return _run(system, options, _completed(options, system, experiment))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _given(option: float | None, *defaults: float | None) -> float | None:
+def _completed(options: argparse.Namespace, system: System, file: Experiment) -> Experiment:
+    """Return the experiment: what is given goes before what a file says, and that before what FMUs propose."""
+    slaves = list(system.slaves.values())
+    proposed = Experiment(
+        start_time=slaves[0].default_start_time if len(slaves) == 1 else None,
+        stop_time=max((s.default_stop_time for s in slaves if s.default_stop_time is not None), default=None),
+        step_size=min((s.default_step for s in slaves if s.default_step is not None), default=None),
+    )
     # Not `or`: a stop time of 0 is given, and refused with its own sentence.
-    return next((value for value in (option, *defaults) if value is not None), None)
+    return Experiment(
+        **{
+            field.name: next(
+                (v for v in (getattr(x, field.name, None) for x in (options, file, proposed)) if v is not None), None
+            )
+            for field in fields(Experiment)
+        }
+    )
 
 
 def _agents(scenario: Scenario, folder: Path) -> System:
@@ -109,7 +128,7 @@ def _set_starts(slaves: dict[str, Slave], starts: dict[str, str]) -> None:
         slave, own = _owner(slaves, name)
         try:
             slave.set(own, slave.parse(own, text))
-        except MisfitError as error:
+        except CosimError as error:
             raise UsageError(f"--start-value: {error}") from error
 
 
@@ -126,14 +145,13 @@ def _owner(slaves: dict[str, Slave], name: str) -> tuple[Slave, str]:
     raise UsageError(f"--start-value {name} names no slave; the slaves are {', '.join(slaves)}.")
 
 
-def _run(system: System, options: argparse.Namespace, t_stop: float | None) -> int:
-    t_start = _given(options.start_time, *(slave.default_start_time for slave in _single(system)), 0.0)
-    if t_stop is None or t_start is None:
+def _run(system: System, options: argparse.Namespace, experiment: Experiment) -> int:
+    if experiment.stop_time is None:
         raise UsageError(f"{options.system} proposes no stop time: give --stop-time.")
     inputs = read_inputs(options.input_file, system) if options.input_file else {}
-    files = RunFiles(options, system, t_stop)
+    files = RunFiles(options, system, experiment.stop_time)
     try:
-        result = _master(system, options, (t_start, t_stop), inputs, files)
+        result = _master(system, options, experiment, inputs, files)
     except (CosimError, KeyboardInterrupt):
         if files.result is not None and options.output_file:
             print(
@@ -146,31 +164,26 @@ def _run(system: System, options: argparse.Namespace, t_stop: float | None) -> i
     return max(exit_of(result.ended.name), files.finish(result))
 
 
-def _single(system: System) -> list[Slave]:
-    """Return the slave of a system that has one: what it proposes is taken."""
-    slaves = list(system.slaves.values())
-    return slaves if len(slaves) == 1 else []
-
-
 def _master(
-    system: System, options: argparse.Namespace, span: tuple[float, float], inputs: dict[str, Given], files: RunFiles
+    system: System, options: argparse.Namespace, experiment: Experiment, inputs: dict[str, Given], files: RunFiles
 ) -> CosimResult:
-    t_start, t_stop = span
+    t_start, t_stop = experiment.start_time or 0.0, experiment.stop_time
+    assert t_stop is not None
     slaves = list(system.slaves.values())
-    # Agents of a scenario propose nothing of their own.
-    proposed = next((slave.default_step for slave in _single(system)), None)
+    proposed = experiment.step_size
     curves = any(isinstance(given, Curve) for given in inputs.values())
     exact = not curves and all(slave.has_event_mode and slave.variable_step for slave in slaves)
-    if (options.master or (EVENT_EXACT if exact else FIXED_STEP)) == FIXED_STEP:
-        step = _given(options.step_size, proposed, _part(t_stop - t_start, STEP))
-        assert step is not None
+    if experiment.master not in (None, *MASTERS):
+        raise UsageError(f"the master {experiment.master!r} is none of {', '.join(MASTERS)}.")
+    if (experiment.master or (EVENT_EXACT if exact else FIXED_STEP)) == FIXED_STEP:
+        step = _part(t_stop - t_start, STEP) if proposed is None else proposed
         return run_fixed_step(
             system,
             t_stop,
             step,
             t_start=t_start,
             record=system.output_names,
-            output_interval=options.output_interval,
+            output_interval=experiment.output_interval,
             inputs=inputs,
             watch=files.watch,
         )
@@ -178,7 +191,9 @@ def _master(
         print("hybrid-fmu: --step-size is for the fixed-step master; this run is event-exact.", file=sys.stderr)
     # A step is proposed for masters that need short ones; here it is the output that it would make long.
     dense = proposed is not None and t_stop - t_start > MOST * proposed
-    interval = _given(options.output_interval, None if dense else proposed, _part(t_stop - t_start, OUTPUT_INTERVAL))
+    interval = experiment.output_interval
+    if interval is None:
+        interval = _part(t_stop - t_start, OUTPUT_INTERVAL) if dense or proposed is None else proposed
     rows = bool(options.output_file or options.plot or options.show_plot)
     return run_event_exact(
         system,

@@ -9,9 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-
-class UsageError(ValueError):
-    """A command was given something that it does not know."""
+from cosim.errors import UsageError
 
 
 class Exit(enum.IntEnum):

@@ -9,8 +9,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from cosim.cli.exits import Exit, UsageError
-from cosim.errors import CosimError
+from cosim.cli.exits import Exit
+from cosim.errors import CosimError, UsageError
 from fmu.errors import BuildError, ExportError
 from hybrid_model import HybridModelError
 from hybrid_model.consensus.messages import ScenarioError

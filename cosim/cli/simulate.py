@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 import hybrid_model as hm
-from cosim.cli.exits import UsageError, exit_of, write_csv
+from cosim.cli.exits import exit_of, write_csv
 from cosim.consensus import in_process_system, network_report
+from cosim.errors import UsageError
 from cosim.masters import run_event_exact
 from cosim.masters.start import require_times
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop

@@ -7,7 +7,8 @@ import json
 import textwrap
 from pathlib import Path
 
-from cosim.cli.exits import Exit, UsageError, progress
+from cosim.cli.exits import Exit, progress
+from cosim.errors import UsageError
 from fmu.validate.check import check_fmu
 from fmu.validate.findings import Report, Severity
 from fmu.validate.smoke.child_process import RunLimits

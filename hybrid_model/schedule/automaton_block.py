@@ -110,7 +110,7 @@ class AutomatonBlock(Block):
         if run.stopped is not None:
             return Update(False, ticks, terminated=termination(run))
         again = run.due() is not None
-        return Update(again, ticks, None if again else self._predict())
+        return Update(again, ticks, None if again else self._predict(), idle=index is None)
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Block.step`."""

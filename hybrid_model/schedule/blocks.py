@@ -40,12 +40,15 @@ class Update:
         Absolute time in s of the block's next event as long as its inputs stay; None if it does not know.
     terminated : Termination or None
         Why the block ended the run, if it did.
+    idle : bool
+        Whether the block knows that nothing happened: there was no event.
     """
 
     again: bool
     ticks: tuple[str, ...] = ()
     next_event: float | None = None
     terminated: Termination | None = None
+    idle: bool = False
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,8 @@ class NativeBlock(Block):
     ) -> None:
         require_supported(solver)
         self.name, self._automaton = name, automaton
-        self._run = NativeRun(model_of(automaton, check, stiff=solver.method in FOR_STIFF_FLOWS))
+        model = model_of(automaton, check, stiff=solver.method in FOR_STIFF_FLOWS)
+        self._run, self._jumps = NativeRun(model), len(model.jumps)
         layout = inputs.layout
         set_options(self._run, solver, zeno, layout.sizes[Kind.STATE])
         parameters = inputs.parameters_at(span[0])
@@ -111,7 +112,9 @@ class NativeBlock(Block):
         ticks = tuple(name for jump, name in self._clocks if jump == made.jump)
         if made.over:
             return Update(False, ticks, terminated=self._termination())
-        return Update(bool(made.again), ticks, made.next if math.isfinite(made.next) else None)
+        return Update(
+            bool(made.again), ticks, made.next if math.isfinite(made.next) else None, idle=made.jump >= self._jumps
+        )
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Block.step`."""

@@ -124,6 +124,7 @@ class Scheduler:
         self._watch = watch
         self._places = {name: _Place(block, k, t_start, t_start) for k, (name, block) in enumerate(blocks.items())}
         self._unpredictable: set[str] = set()
+        self._idle: set[str] = set()
         self._arrived: dict[tuple[str, str], Any] = {}
         self._queue: list[tuple[float, int, int, str]] = []
 
@@ -168,6 +169,8 @@ class Scheduler:
                 raise SchedulingError(f"{name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s.")
             update = self._places[name].block.update()
             self.ticks += [Tick(t, name, clock) for clock in update.ticks]
+            if update.idle and iterations[name] == 1:
+                self._idle.add(name)
             if update.terminated:
                 self.ended = name, t, update.terminated
                 return
@@ -189,8 +192,10 @@ class Scheduler:
             return
         for name in self._in_order(due):
             self._places[name].block.enter_event_mode()
-            self.events.append(Event(t, name))
+        self._idle.clear()
         self.handle_events(t, due)
+        # Predictions end at the stop time, where there may be no event.
+        self.events += [Event(t, name) for name in self._in_order(due) if name not in self._idle]
         if self._watch:
             self._watch(t)
 

@@ -1,0 +1,65 @@
+"""A described system made into slaves with connections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from cosim.automaton_slave import AutomatonSlave
+from cosim.errors import MisfitError
+from cosim.fmu_slave import FmuSlave
+from cosim.slave import Slave
+from cosim.system import System
+from cosim.systems.automaton_files import find_automaton, imports_from_here
+from cosim.systems.definition import FMU, Component, SystemDefinition
+
+
+def assemble(definition: SystemDefinition, *, validate: bool = True) -> System:
+    """Make a system: its slaves with their start values, and its connections.
+
+    Parameters
+    ----------
+    definition : SystemDefinition
+    validate : bool
+        Whether to hold descriptions of FMUs against the schema.
+
+    Raises
+    ------
+    CosimError
+        If an FMU cannot be used; MisfitError if a value or a connection does not fit.
+    UsageError, ExportError
+        If an automaton cannot be found or made.
+    """
+    slaves = [_slave(component, validate) for component in definition.components]
+    for component, slave in zip(definition.components, slaves, strict=True):
+        for name, value in component.start.items():
+            set_start(slave, name, value)
+    return System(slaves, definition.connections)
+
+
+def set_start(slave: Slave, name: str, value: Any) -> None:
+    """Give a slave a start value: a number, a text that says a value, or a sequence for an array.
+
+    Raises
+    ------
+    MisfitError
+        If there is no such variable, or it does not hold the value.
+    """
+    if isinstance(value, Mapping):
+        raise MisfitError(f"{slave.name}.{name} is given a table: quote names with points, or give a value.")
+    if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
+        slave.set(name, slave.parse(name, value) if isinstance(value, str) else value)
+        return
+    elements = [own for own in slave.variable_names if own.startswith(f"{name}[")]
+    if len(elements) != len(value):
+        raise MisfitError(f"{slave.name}.{name} has {len(elements)} elements, but {len(value)} values are given.")
+    for element, part in zip(elements, value, strict=True):
+        set_start(slave, element, part)
+
+
+def _slave(component: Component, validate: bool) -> Slave:
+    if component.kind == FMU:
+        return FmuSlave(component.name, component.source, validate=validate)
+    with imports_from_here(component.source):
+        automaton = find_automaton(component.source, component.arguments)
+    return AutomatonSlave(component.name, automaton)

@@ -1,0 +1,120 @@
+"""Systems in TOML files."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Collection, Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import MisfitError
+from cosim.systems.definition import AUTOMATON, FMU, Component, Experiment, SystemDefinition
+
+_TABLES = ("name", "experiment", "components", "connections", "inputs")
+_COMPONENT = (FMU, AUTOMATON, "start", "arguments", "interface")
+INTERFACES = ("cs", "me")
+
+
+def is_system(path: str | Path) -> bool:
+    """Return whether a TOML file describes a system; scenarios have no components."""
+    try:
+        return "components" in _document(path)
+    except MisfitError:
+        return False
+
+
+def read_toml(path: str | Path) -> SystemDefinition:
+    """Read a system.
+
+    Paths in the file are relative to its folder. The form is in docs/cosimulation.md.
+
+    Raises
+    ------
+    MisfitError
+        If the file is not TOML, an entry is unknown, missing or of the wrong type; with the entry.
+    """
+    path, document = Path(path), _document(path)
+    _require_known(path, "", document, _TABLES)
+    folder = path.parent
+    components = [_component(path, folder, name, entry) for name, entry in _table(path, document, "components").items()]
+    if not components:
+        raise MisfitError(f"{path} has no components: give [components.NAME] with fmu or automaton.")
+    connections = _table(path, document, "connections")
+    for target, source in connections.items():
+        if not isinstance(source, str) and not (isinstance(source, list) and all(isinstance(s, str) for s in source)):
+            raise MisfitError(
+                f"{path}: connections.{target!r} is {source!r}: give the name of an output, or a list of them. Names "
+                'with points are quoted: "b.u" = "a.y".'
+            )
+    inputs = _table(path, document, "inputs")
+    _require_known(path, "inputs.", inputs, ("file",))
+    return SystemDefinition(
+        str(document.get("name", path.stem)),
+        components,
+        connections,
+        folder / _text(path, "inputs.file", inputs["file"]) if "file" in inputs else None,
+        _experiment(path, _table(path, document, "experiment")),
+    )
+
+
+def _document(path: str | Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise MisfitError(f"{path} cannot be read as TOML: {error}") from error
+
+
+def _component(path: Path, folder: Path, name: str, entry: Any) -> Component:
+    where = f"components.{name}"
+    if not isinstance(entry, dict):
+        raise MisfitError(f"{path}: {where} is {entry!r}: give a table.")
+    _require_known(path, f"{where}.", entry, _COMPONENT)
+    kinds = [kind for kind in (FMU, AUTOMATON) if kind in entry]
+    if len(kinds) != 1:
+        raise MisfitError(
+            f"{path}: {where} has {' and '.join(kinds) or 'neither fmu nor automaton'}: give one of them."
+        )
+    source = _text(path, f"{where}.{kinds[0]}", entry[kinds[0]])
+    if kinds[0] == FMU or source.rpartition(":")[0].endswith(".py"):
+        source = str(folder / source)
+    interface = entry.get("interface")
+    if interface is not None and interface not in INTERFACES:
+        raise MisfitError(f"{path}: {where}.interface is {interface!r}: give one of {', '.join(INTERFACES)}.")
+    start, arguments = (_table(path, entry, key, f"{where}.") for key in ("start", "arguments"))
+    return Component(name, kinds[0], source, start, arguments, interface)
+
+
+def _experiment(path: Path, entry: Mapping[str, Any]) -> Experiment:
+    known = [field.name for field in fields(Experiment)]
+    _require_known(path, "experiment.", entry, known)
+    for name, value in entry.items():
+        number = isinstance(value, (int, float)) and not isinstance(value, bool)
+        if name == "master" and not isinstance(value, str):
+            raise MisfitError(f"{path}: experiment.master is {value!r}: give the name of one.")
+        if name != "master" and not number:
+            raise MisfitError(f"{path}: experiment.{name} is {value!r}: give a number.")
+    numbers: dict[str, Any] = {name: float(value) for name, value in entry.items() if name != "master"}
+    return Experiment(**numbers, master=entry.get("master"))
+
+
+def _table(path: Path, document: Mapping[str, Any], name: str, prefix: str = "") -> dict[str, Any]:
+    table = document.get(name, {})
+    if not isinstance(table, dict):
+        raise MisfitError(f"{path}: {prefix}{name} is {table!r}: give a table.")
+    return table
+
+
+def _text(path: Path, name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise MisfitError(f"{path}: {name} is {value!r}: give text.")
+    return value
+
+
+def _require_known(path: Path, prefix: str, table: Mapping[str, Any], known: Collection[str]) -> None:
+    unknown = next((name for name in table if name not in known), None)
+    if unknown is not None:
+        near = get_close_matches(unknown, known, 1)
+        hint = f" Did you mean {near[0]}?" if near else ""
+        raise MisfitError(f"{path}: there is no entry {prefix}{unknown}; there are {', '.join(known)}.{hint}")

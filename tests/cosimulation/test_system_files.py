@@ -1,0 +1,145 @@
+"""Systems from TOML files and folders: what they hold, and what is refused, with the entry."""
+
+import pytest
+
+from cosim.cli.main import main
+from cosim.errors import MisfitError
+from cosim.systems.assembly import assemble
+from cosim.systems.files import read_system
+from cosim.systems.toml_file import read_toml
+
+AUTOMATA = """
+import hybrid_model as hm
+
+class Counter(hm.HybridAutomaton):
+    period = hm.Parameter(0.5)
+    last = hm.DiscreteState(0.0)
+    count = hm.DiscreteState(0.0, output=True)
+
+    def due(self, s):
+        return s.last + s.period
+
+    def tick(self, s):
+        return {"count": s.count + 1, "last": s.last + s.period}
+
+    transitions = (hm.TimeEvent("tick", due, tick),)
+
+class Sum(hm.HybridAutomaton):
+    many = hm.Input([0.0, 0.0], discrete=True)
+    rate = hm.Input(0.0, discrete=True)
+    total = hm.Output()
+    x = hm.State(0.0, output=True)
+
+    def flow_map(self, s):
+        return {"x": s.rate}
+
+    def outputs(self, s):
+        return {"total": s.many[0] + s.many[1]}
+"""
+SYSTEM = """
+[experiment]
+stop_time = 2.2
+
+[components.a]
+automaton = "blocks.py:Counter"
+start = { period = 0.5 }
+[components.b]
+automaton = "blocks.py:Counter"
+start = { period = 1.0, count = 10 }
+[components.sum]
+automaton = "blocks.py:Sum"
+
+[connections]
+"sum.many" = ["a.count", "b.count"]
+
+[inputs]
+file = "in.csv"
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "blocks.py").write_text(AUTOMATA)
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    (tmp_path / "in.csv").write_text("time,sum.rate\n0,1\n1,2\n")
+    return tmp_path
+
+
+def changed(folder, old, new):
+    path = folder / "system.toml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    return path
+
+
+@pytest.mark.parametrize("name", ["", "system.toml"])
+def test_a_system_in_a_file_runs(name, folder, capsys):
+    assert main(["cosim", str(folder / name), "--output-file", str(folder / "out.csv")]) == 0
+    said = capsys.readouterr().out
+    # Four ticks of 0.5 s, and two of 1 s after ten.
+    assert "sum.total = 16" in said
+    assert "sum.x = 3.4" in said
+    assert "a: 4 events at 0.5, 1, 1.5, 2 s" in said
+
+
+def test_options_go_before_what_the_file_says(folder, capsys):
+    command = ["cosim", str(folder), "--stop-time", "1.2", "--start-value", "b.count=20", "--output-interval", "0.6"]
+    assert main(command) == 0
+    assert "sum.total = 23" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("[inputs]", "[input]", "there is no entry input; .* Did you mean inputs"),
+        ("stop_time = 2.2", 'stop_time = "2"', "experiment.stop_time is '2': give a number"),
+        ("start = { period = 0.5 }", "strat = 1", "there is no entry components.a.strat.* Did you mean start"),
+        ('automaton = "blocks.py:Sum"', "", "components.sum has neither fmu nor automaton"),
+        ('["a.count", "b.count"]', "3", "connections.'sum.many' is 3: give the name of an output"),
+        ('"sum.many" =', "sum.many =", "connections.'sum' is .*Names with points are quoted"),
+        ("[experiment]", "[experiment", "cannot be read as TOML"),
+        ('automaton = "blocks.py:Sum"', 'fmu = "x.fmu"\ninterface = "se"', "interface is 'se': give one of cs, me"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_with_the_entry(old, new, sentence, folder):
+    path = changed(folder, old, new)
+    with pytest.raises(MisfitError, match=sentence):
+        read_toml(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("period = 0.5", "perod = 0.5", "a has no variable 'perod'"),
+        ('"b.count"]', '"b.cuont"]', "b.cuont is not an output"),
+        ('["a.count", "b.count"]', '"a.count"', r"sum.many has the elements \[1\] to \[2\] and a.count no elements"),
+        ("count = 10", "count = [10]", "b.count has 0 elements, but 1 values are given"),
+    ],
+)
+def test_what_does_not_fit_is_refused(old, new, sentence, folder):
+    path = changed(folder, old, new)
+    with pytest.raises(MisfitError, match=sentence):
+        assemble(read_toml(path))
+
+
+def test_a_master_that_there_is_not_is_refused(folder, capsys):
+    assert main(["cosim", str(changed(folder, "stop_time = 2.2", 'stop_time = 2.2\nmaster = "best"'))]) == 2
+    assert "the master 'best' is none of event-exact, fixed-step" in capsys.readouterr().err
+
+
+def test_a_folder_of_fmus_is_a_system_of_them(stranger, tmp_path, capsys):
+    stranger("one"), stranger("two")
+    assert main(["cosim", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "one.count = 2" in said
+    assert "two.count = 2" in said
+    (tmp_path / "empty").mkdir()
+    assert main(["cosim", str(tmp_path / "empty")]) == 1
+    assert "has no system.toml and no FMU" in capsys.readouterr().err
+
+
+def test_a_scenario_is_no_system(tmp_path):
+    (tmp_path / "scenario.toml").write_text("stop_time = 1.0\n[network]\nagents = 2\n")
+    assert read_system(tmp_path / "scenario.toml") is None
+    assert read_system("paper-a") is None
