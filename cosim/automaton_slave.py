@@ -11,13 +11,15 @@ from cosim.errors import CosimError, MisfitError
 from cosim.slave import Port, Slave
 from fmu.importer.values import Value
 from hybrid_model import Automaton, Execution, Solver, ZenoGuard
+from hybrid_model.declare.arguments import require_choice
 from hybrid_model.declare.layout import Layout, layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import Kind, element_names
 from hybrid_model.errors import BuildError, SchedulingError, TraceError
+from hybrid_model.reference.first_look import checked
 from hybrid_model.schedule.automaton_block import AutomatonBlock
 from hybrid_model.schedule.blocks import Step, Update
-from hybrid_model.simulate import ENGINES, checked, require_choice
+from hybrid_model.simulate import ENGINES
 
 if TYPE_CHECKING:
     from hybrid_model.schedule.native_block import NativeBlock

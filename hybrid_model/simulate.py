@@ -6,11 +6,16 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
-from hybrid_model.declare.arguments import real_number, require_automaton, require_inputs, require_options
+from hybrid_model.declare.arguments import (
+    real_number,
+    require_automaton,
+    require_choice,
+    require_inputs,
+    require_options,
+)
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.calls import explained
 from hybrid_model.declare.layout import layout_of
-from hybrid_model.declare.real_numbers import told
 from hybrid_model.declare.signals import Inputs, InputValue
 from hybrid_model.errors import BuildError, SimulationError, TraceError
 from hybrid_model.record.arc import HybridArc
@@ -19,6 +24,7 @@ from hybrid_model.record.flow_piece import unseen
 from hybrid_model.record.recording import Recording
 from hybrid_model.record.run_record import RunRecord
 from hybrid_model.reference.execution import Execution
+from hybrid_model.reference.first_look import checked
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
 from hybrid_model.zeno_guard import ZenoGuard
@@ -148,15 +154,3 @@ def _reference_run(
     read = ComputedValues(automaton, execution.inputs)
     stop, message = execution.stopped, execution.message
     return RunRecord(read, recording.flows, recording.jumps, stop, message, execution.event_tolerance)
-
-
-def checked(start: Execution) -> None:
-    """Call the maps at the start with numbers, those of the flow where a run would flow from there."""
-    if start.due() is None and start.x.size and start.in_flow_set() and start.t_stop > start.t:
-        start.rates_at(start.t, start.x)
-
-
-def require_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
-    """Raise SimulationError for a value that is none of the choices."""
-    if given not in choices:
-        raise SimulationError(f"{name} = {told(given)}: give one of {', '.join(map(repr, choices))}.")

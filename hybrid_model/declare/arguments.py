@@ -108,3 +108,9 @@ def real_number(name: str, given: Any) -> float:
         return float(given)
     except OverflowError as error:
         raise SimulationError(f"{name} = {told(given)} is too large: give a number in s.") from error
+
+
+def require_choice(name: str, given: object, choices: tuple[str, ...]) -> None:
+    """Raise SimulationError for a value that is none of the choices."""
+    if given not in choices:
+        raise SimulationError(f"{name} = {told(given)}: give one of {', '.join(map(repr, choices))}.")

@@ -127,6 +127,13 @@ bool engine_take_memory(Engine *engine)
     return true;
 }
 
+void engine_use_block(Engine *engine, void *block)
+{
+    engine->block = block;
+    lay_out_block(engine, engine->block);
+    engine->view = VIEW_NONE;
+}
+
 void engine_free(Engine *engine)
 {
     if (!engine)

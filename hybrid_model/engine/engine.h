@@ -91,6 +91,9 @@ void engine_reset(Engine *engine);
 size_t engine_block_size(const Engine *engine);
 void engine_save(Engine *engine, void *block);
 void engine_restore(Engine *engine, const void *block);
+/* Goes on with the run in a block of the same model, aligned as malloc does: many runs can share an engine, and with it
+   their options and statistics.  Whoever does that gives the engine its own block back before it is freed. */
+void engine_use_block(Engine *engine, void *block);
 /* Whether a block that comes from outside (aligned as malloc does) could be one of this engine's. */
 bool engine_block_is_sound(const Engine *engine, void *block);
 /* The importer's layer's part of a block. */

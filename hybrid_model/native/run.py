@@ -261,6 +261,15 @@ class NativeRun:
         found = self._library.run_statistics(self._engine).contents
         return RunStatistics(*(int(getattr(found, name)) for name in _COUNTS))
 
+    @property
+    def address(self) -> int:
+        """Of the engine."""
+        return int(self._engine)
+
+    def recorded(self, states: int, discrete: int) -> Rows:
+        """Return a copy of all that has been recorded of a run with so many states."""
+        return Rows(self._rows(0), self._rows(1), states, discrete, self.model.jumps)
+
     def rows(self, *, events_only: bool) -> Rows:
         """Return a copy of what has been recorded: all, or the jumps alone."""
         jumps, names = self._rows(1), self.model.jumps

@@ -13,7 +13,7 @@ from hybrid_model.errors import SimulationError, TraceError
 from hybrid_model.native.driven import Driven, drive
 from hybrid_model.native.kept_models import made_model, model_of, traced_maps, what_ran
 from hybrid_model.native.networks.network import NetworkTrace
-from hybrid_model.native.run import Advance, Ending, NativeModel, NativeRun, Record
+from hybrid_model.native.run import Advance, Ending, NativeModel, NativeRun, Options, Record
 from hybrid_model.record.arc_values import ComputedValues
 from hybrid_model.record.row_flows import RowFlows, RowJumps
 from hybrid_model.record.run_record import RunRecord
@@ -156,7 +156,11 @@ def require_supported(solver: Solver) -> None:
 
 def set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard, states: int) -> None:
     """Give a run of so many states, which has not begun, its accuracy and what counts as an accumulation of jumps."""
-    options = run.options
+    fill_options(run.options, solver, zeno, states)
+
+
+def fill_options(options: Options, solver: Solver, zeno: ZenoGuard, states: int) -> None:
+    """Write the same into the options of an engine."""
     options.relative_tolerance = solver.rtol
     options.absolute_tolerance = solver.atol or 0.0
     options.longest_step = solver.max_step

@@ -12,9 +12,10 @@ import hybrid_model as hm
 from hybrid_model.models import BouncingBall, SampledLtiLoop
 from hybrid_model.native import run
 from hybrid_model.native.build.compiler import find_compiler
-from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDER
+from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDERS
 
-SOURCES = {file.name: file for folder in (*ENGINE_FOLDERS, RUNS_FOLDER) for file in sorted(folder.glob("*.c"))}
+FOLDERS = (*ENGINE_FOLDERS, *RUNS_FOLDERS)
+SOURCES = {file.name: file for folder in FOLDERS for file in sorted(folder.glob("*.c"))}
 FAULTS = {
     "a step that was cut is kept whole": ("recorder.c", "row[2] = end;", "row[2] = t1;"),
     "the start of a step is lost": ("recorder.c", "row[0] = engine->step.t0;", "row[0] = *engine->live.time + 1e-3;"),
@@ -56,7 +57,7 @@ def built(folder, name, changed=None, flags=("-O1",)):
         assert text.count(old) == 1, f"{file}: {text.count(old)} places have {old!r}"
         files[file] = own / file
         files[file].write_text(text.replace(old, new))
-    includes = [f"-I{place}" for place in ENGINE_FOLDERS]
+    includes = [f"-I{place}" for place in FOLDERS]
     command = [*find_compiler(), "-std=c99", "-shared", "-fPIC", "-fvisibility=hidden", *flags, *includes]
     subprocess.run([*command, *map(str, files.values()), "-lm", "-o", str(target)], check=True, capture_output=True)
     return target

@@ -8,10 +8,14 @@ from hybrid_model import consensus
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.models import BouncingBall, FireflyNetwork
 
+ENGINES = pytest.mark.parametrize("engine", ["native", "python"])
 
-def compare(network, t_end, *, atol=1e-9, **options):
+
+def compare(network, t_end, *, engine="native", atol=1e-9, **options):
     """Run a network in both ways and compare all jumps of all parts, and the states at many times."""
-    apart, together = hm.simulate_network(network, t_end, **options), hm.simulate(network, t_end, **options)
+    apart = hm.simulate_network(network, t_end, engine=engine, **options)
+    together = hm.simulate(network, t_end, **options)
+    assert apart.engine.startswith(engine)
     assert apart.stop is together.stop
     for part, automaton in network.parts.items():
         own = [(info.name, f"{part}.{info.name}") for info in automaton.jumps]
@@ -28,15 +32,17 @@ def compare(network, t_end, *, atol=1e-9, **options):
     return apart, together
 
 
+@ENGINES
 @pytest.mark.parametrize("kind", ["static", "dynamic"])
-def test_the_papers_network(kind):
+def test_the_papers_network(kind, engine):
     scenario = consensus.replace_trigger(consensus.load_scenario("paper-a"), kind)
     # Events near zero weight are ill conditioned: times to 1e-9 s there, states far better.
-    compare(consensus.closed_loop(scenario), 6.0)
+    compare(consensus.closed_loop(scenario), 6.0, engine=engine)
 
 
-def test_pulses_and_cascades_at_one_instant():
-    apart, together = compare(FireflyNetwork([0.13, 0.95, 0.62, 0.95]), 6.4)
+@ENGINES
+def test_pulses_and_cascades_at_one_instant(engine):
+    apart, together = compare(FireflyNetwork([0.13, 0.95, 0.62, 0.95]), 6.4, engine=engine)
     assert [jump.t for _, jump in apart.jumps] == pytest.approx([jump.t for jump in together.jumps], abs=1e-9)
 
 
@@ -60,12 +66,14 @@ def ring(count, **trigger):
     )
 
 
-def test_a_ring_of_agents():
-    apart, _ = compare(ring(12), 5.0)
+@ENGINES
+def test_a_ring_of_agents(engine):
+    apart, _ = compare(ring(12), 5.0, engine=engine)
     assert len(apart.jumps) > 40
 
 
-def test_symmetric_agents_fire_together_in_the_order_of_the_parts():
+@ENGINES
+def test_symmetric_agents_fire_together_in_the_order_of_the_parts(engine):
     network = consensus.closed_loop(
         consensus.read_scenario(
             {
@@ -77,7 +85,7 @@ def test_symmetric_agents_fire_together_in_the_order_of_the_parts():
             }
         )
     )
-    apart, _ = compare(network, 3.0)
+    apart, _ = compare(network, 3.0, engine=engine)
     parts = [part for part, jump in apart.jumps if jump.name == "trigger.broadcast"]
     assert parts == ["agent1", "agent2"] * (len(parts) // 2)
 
@@ -91,7 +99,7 @@ def cost_per_event(network, t_end, monkeypatch):
         return rates(self, *arguments)
 
     monkeypatch.setattr(hm.declare.vector_form.VectorForm, "rates", counted)
-    run = hm.simulate_network(network, t_end)
+    run = hm.simulate_network(network, t_end, engine="python")
     monkeypatch.undo()
     return evaluations[0] / len(run.jumps)
 
@@ -124,31 +132,37 @@ def test_inputs_from_outside_are_known_ahead():
         "left.u": hm.Signal(lambda t: 1.0 if t < 2.5 else -1.0, [2.5]),
         "right.u": lambda t: np.cos(t),
     }
-    compare(network, 9.0, inputs=inputs)
+    compare(network, 9.0, engine="python", inputs=inputs)
+    assert "follows time" in hm.simulate_network(network, 1.0, inputs=inputs).engine
+    with pytest.raises(hm.SimulationError, match=r"pair cannot run on the native engine: .*left"):
+        hm.simulate_network(network, 1.0, inputs=inputs, engine="native")
 
 
-def test_a_part_whose_jumps_accumulate_ends_the_run_by_name():
+@ENGINES
+def test_a_part_whose_jumps_accumulate_ends_the_run_by_name(engine):
     network = hm.product("two", BouncingBall("slow", e=0.95), BouncingBall("fast"))
-    run = hm.simulate_network(network, 9.0)
+    run = hm.simulate_network(network, 9.0, engine=engine)
     assert run.stop is hm.Stop.ZENO
     assert "part fast" in run.message
     assert run.t == pytest.approx(2.558634, abs=1e-5)
     assert len(run.arcs["slow"].jumps) > 0
 
 
-def test_internal_breakpoints_are_in_the_arcs():
+@ENGINES
+def test_internal_breakpoints_are_in_the_arcs(engine):
     scenario = consensus.load_scenario("paper-a")
     network = consensus.closed_loop(scenario)
-    run = hm.simulate_network(network, 4.0)
+    run = hm.simulate_network(network, 4.0, engine=engine)
     for arc in run.arcs.values():
         times = [jump.t for jump in arc.jumps if jump.name == "weights.piece"]
         assert len(times) > 5
         assert all(info.trigger is Trigger.TIME for info in arc.automaton.jumps if info.internal)
 
 
-def test_each_part_has_a_hybrid_arc_that_verifies():
+@ENGINES
+def test_each_part_has_a_hybrid_arc_that_verifies(engine):
     network = ring(5)
-    run = hm.simulate_network(network, 4.0)
+    run = hm.simulate_network(network, 4.0, engine=engine)
     for arc in run.arcs.values():
         report = hm.verify(arc.automaton, arc)
         assert report.ok, str(report)
@@ -178,7 +192,8 @@ def test_an_unknown_part_is_named():
         hm.simulate_network(ring(3), 0.1).event_times("agent9", "trigger.broadcast")
 
 
-def test_what_a_jump_saw_is_what_had_arrived_before_it(tmp_path):
+@ENGINES
+def test_what_a_jump_saw_is_what_had_arrived_before_it(tmp_path, engine):
     """At t = 1 the asker takes its input over and sends, and gets the answer at the same instant, after its jump."""
 
     class Asker(hm.HybridAutomaton):
@@ -211,7 +226,7 @@ def test_what_a_jump_saw_is_what_had_arrived_before_it(tmp_path):
     network = hm.Composition(
         "talk", {"asker": Asker(), "answerer": Answerer()}, {"asker.u": "answerer.answer", "answerer.u": "asker.sent"}
     )
-    arc = hm.simulate_network(network, 8.0).arcs["asker"]
+    arc = hm.simulate_network(network, 8.0, engine=engine).arcs["asker"]
     path = tmp_path / "asker.npz"
     arc.save(path)
     for found in (arc, hm.load_arc(path)):

@@ -21,7 +21,7 @@ from hybrid_model.native.build.objects import (
     digest,
     own_units,
 )
-from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDER
+from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDERS
 
 MODEL_SYMBOL = "model_of_library"
 """The function of a model's library that returns the address of its ``Model``."""
@@ -57,7 +57,7 @@ def engine_library() -> Path:
         If there is no C compiler, or it fails.
     """
     toolchain = _toolchain()
-    folders = (*ENGINE_FOLDERS, RUNS_FOLDER)
+    folders = (*ENGINE_FOLDERS, *RUNS_FOLDERS)
     sources = [source for folder in folders for source in sorted(folder.glob("*.c"))]
 
     def make(library: Path) -> None:
@@ -113,7 +113,7 @@ def _toolchain() -> Toolchain:
 
 
 def _engine_digest(pattern: str) -> str:
-    folders = (*ENGINE_FOLDERS, RUNS_FOLDER)
+    folders = (*ENGINE_FOLDERS, *RUNS_FOLDERS)
     return digest(file for folder in folders for file in sorted(folder.glob(pattern)))
 
 
@@ -126,7 +126,7 @@ def _folder(name: str) -> Iterator[Path]:
 
 
 def _objects(sources: Sequence[Path], toolchain: Toolchain, folder: Path) -> list[str]:
-    units = own_units(sources, ENGINE_FOLDERS, toolchain, folder)
+    units = own_units(sources, (*ENGINE_FOLDERS, *RUNS_FOLDERS), toolchain, folder)
     compile_units(units, folder)
     return [str(unit.file) for unit in units]
 

@@ -1,0 +1,152 @@
+/* What a process that has loaded the engine as a library may call to run networks part by part: see schedule.h. */
+#include "schedule.h"
+
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#elif defined(__GNUC__)
+#define EXPORT __attribute__((visibility("default")))
+#else
+#define EXPORT
+#endif
+
+/* Changes with every change of what follows. */
+#define PARTS_INTERFACE 1
+
+/* Events since they were taken last, in columns. */
+typedef struct {
+    size_t count, width;
+    const double *times;
+    const uint32_t *parts, *jumps;
+    const double *values;
+} NetworkEvents;
+
+/* Why a network has ended, and where: a part's number, the time in s, and the engine's `Ending` of that part (ENDED_NOT
+   where the scheduler refused to go on). */
+typedef struct {
+    uint32_t part;
+    int end, ending;
+    double t;
+    const char *message;
+} NetworkEnd;
+
+EXPORT int parts_interface(void);
+EXPORT Schedule *parts_create(size_t n_groups, const Model *const models[], size_t n_parts, const uint32_t groups[]);
+EXPORT EngineOptions *parts_options(Schedule *schedule, size_t group);
+EXPORT int parts_sends(Schedule *schedule, size_t group, size_t count, const Signal signals[]);
+EXPORT void parts_wires(Schedule *schedule, const uint64_t first[], const uint32_t signals[],
+                          const uint32_t targets[], const uint32_t inputs[]);
+EXPORT void parts_place(Schedule *schedule, size_t group, const double *const values[]);
+EXPORT int parts_start(Schedule *schedule, double start, double stop, int computed);
+EXPORT int parts_begin(Schedule *schedule);
+EXPORT int parts_advance(Schedule *schedule, double target, size_t events);
+EXPORT double parts_time(const Schedule *schedule);
+EXPORT void parts_take_events(Schedule *schedule, NetworkEvents *events);
+EXPORT void parts_end(Schedule *schedule, NetworkEnd *end);
+EXPORT void parts_read(Schedule *schedule, size_t group, int bank, double *values);
+EXPORT void parts_read_part(Schedule *schedule, uint32_t part, int bank, double *values);
+EXPORT size_t parts_memory(const Schedule *schedule);
+EXPORT void parts_free(Schedule *schedule);
+
+int parts_interface(void)
+{
+    return PARTS_INTERFACE;
+}
+
+Schedule *parts_create(size_t n_groups, const Model *const models[], size_t n_parts, const uint32_t groups[])
+{
+    return schedule_create(n_groups, models, n_parts, groups);
+}
+
+EngineOptions *parts_options(Schedule *schedule, size_t group)
+{
+    return engine_options(schedule->groups[group].engine);
+}
+
+int parts_sends(Schedule *schedule, size_t group, size_t count, const Signal signals[])
+{
+    return schedule_sends(schedule, group, count, signals);
+}
+
+/* The arrays stay the caller's, who keeps them as long as the network. */
+void parts_wires(Schedule *schedule, const uint64_t first[], const uint32_t signals[], const uint32_t targets[],
+                   const uint32_t inputs[])
+{
+    schedule->wires = (Wires){first, signals, targets, inputs};
+}
+
+void parts_place(Schedule *schedule, size_t group, const double *const values[])
+{
+    schedule_place(schedule, group, values);
+}
+
+int parts_start(Schedule *schedule, double start, double stop, int computed)
+{
+    return schedule_start(schedule, start, stop, computed);
+}
+
+int parts_begin(Schedule *schedule)
+{
+    return schedule_begin(schedule);
+}
+
+int parts_advance(Schedule *schedule, double target, size_t events)
+{
+    return (int)schedule_advance(schedule, target, events);
+}
+
+double parts_time(const Schedule *schedule)
+{
+    return schedule->t;
+}
+
+/* They stay as they are until the network goes on. */
+void parts_take_events(Schedule *schedule, NetworkEvents *events)
+{
+    EventLog *log = &schedule->log;
+    *events = (NetworkEvents){log->count, log->width, log->times, log->parts, log->jumps, log->values};
+    log->count = 0;
+}
+
+void parts_end(Schedule *schedule, NetworkEnd *end)
+{
+    bool refused = schedule->end == SCHEDULE_REFUSED;
+    Engine *engine = schedule_at(schedule, schedule->culprit);
+    *end = (NetworkEnd){schedule->culprit, (int)schedule->end, refused ? ENDED_NOT : (int)engine->status->ending, engine_time(engine),
+                        refused ? schedule->message : engine_message(engine)};
+}
+
+void parts_read_part(Schedule *schedule, uint32_t part, int bank, double *values)
+{
+    Engine *engine = schedule_at(schedule, part);
+    const Model *m = engine->model;
+    const size_t sizes[] = {m->n_states, m->n_discrete, m->n_inputs, m->n_parameters};
+    engine_catch_up(engine);
+    const double *banks[] = {engine->live.x, engine->live.z, engine->u, engine->p};
+    engine_copy(values, banks[bank], sizes[bank]);
+}
+
+/* The values of a bank of all parts of a group, row by row in the order of the parts. */
+void parts_read(Schedule *schedule, size_t group, int bank, double *values)
+{
+    const Model *m = schedule->groups[group].engine->model;
+    const size_t sizes[] = {m->n_states, m->n_discrete, m->n_inputs, m->n_parameters};
+    for (uint32_t i = 0; i < schedule->n_parts; i++)
+        if (schedule->parts[i].group == group)
+            parts_read_part(schedule, i, bank, values + sizes[bank] * schedule->parts[i].member);
+}
+
+/* In bytes, without the events. */
+size_t parts_memory(const Schedule *schedule)
+{
+    size_t sum = schedule->n_parts * (sizeof(Part) + sizeof(double) + 5 * sizeof(uint32_t));
+    for (size_t k = 0; k < schedule->n_groups; k++) {
+        const Group *group = &schedule->groups[k];
+        sum += group->count * (group->block_size + group->n_signals * sizeof(double));
+    }
+    return sum;
+}
+
+void parts_free(Schedule *schedule)
+{
+    schedule_free(schedule);
+}

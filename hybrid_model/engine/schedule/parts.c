@@ -1,0 +1,136 @@
+/* One part of a network: its engine is the one of its group, on a block of its own. */
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "schedule.h"
+
+unsigned char *schedule_block(const Schedule *schedule, uint32_t i)
+{
+    const Part *part = &schedule->parts[i];
+    const Group *group = &schedule->groups[part->group];
+    return group->slab + group->block_size * part->member;
+}
+
+double *schedule_inputs(const Schedule *schedule, uint32_t i)
+{
+    const Group *group = &schedule->groups[schedule->parts[i].group];
+    return (double *)(void *)(schedule_block(schedule, i) + group->inputs_at);
+}
+
+Engine *schedule_at(Schedule *schedule, uint32_t i)
+{
+    Part *part = &schedule->parts[i];
+    Group *group = &schedule->groups[part->group];
+    Engine *engine = group->engine;
+    if (group->present == i)
+        return engine;
+    /* Jumps are bounded part by part. */
+    if (group->present != NOBODY)
+        schedule->parts[group->present].jumps = engine->statistics.jumps;
+    engine_use_block(engine, schedule_block(schedule, i));
+    engine->statistics.jumps = part->jumps;
+    group->present = i;
+    return engine;
+}
+
+bool schedule_refuse(Schedule *schedule, uint32_t part, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(schedule->message, sizeof schedule->message, format, arguments);
+    va_end(arguments);
+    schedule->end = SCHEDULE_REFUSED;
+    schedule->culprit = part;
+    return false;
+}
+
+bool schedule_over(Schedule *schedule, uint32_t part)
+{
+    schedule->end = SCHEDULE_ENDED;
+    schedule->culprit = part;
+    return false;
+}
+
+double schedule_instant(const Schedule *schedule, uint32_t i, double t)
+{
+    const Part *part = &schedule->parts[i];
+    const Engine *engine = schedule->groups[part->group].engine;
+    const ModelScales *scales = &engine->model->scales;
+    if (engine->options.event_tolerance > 0.0)
+        return engine->options.event_tolerance;
+    double by_run = scales->instant * (t - schedule->start);
+    double by_gap = scales->instant_in_gap * (t - part->t_event);
+    return fmax(scales->roundings * engine_time_ulp(t), fmin(by_run, by_gap));
+}
+
+/* Whether the flow of a part has turned out to be stiff, and its model has no derivatives for that: the run is over. */
+static bool needs_another_method(Schedule *schedule, uint32_t i)
+{
+    const Engine *engine = schedule_at(schedule, i);
+    if (!engine->status->is_stiff || engine->implicit.jacobian)
+        return false;
+    schedule->end = SCHEDULE_STIFF;
+    schedule->culprit = i;
+    return true;
+}
+
+bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event)
+{
+    Part *part = &schedule->parts[i];
+    Engine *engine = schedule_at(schedule, i);
+    Advance advance = ADVANCE_PAUSED;
+    while (advance == ADVANCE_PAUSED && !needs_another_method(schedule, i))
+        advance = engine_advance(engine, target, EVENTS_STOP);
+    if (advance == ADVANCE_PAUSED)
+        return false;
+    bool there = advance == ADVANCE_REACHED || advance == ADVANCE_EVENT_AT_TARGET;
+    double reached = there ? target : fmin(engine_time(engine), target);
+    *event = advance == ADVANCE_EVENT_AT_TARGET || advance == ADVANCE_EVENT_BEFORE;
+    part->stalls = reached > part->t ? 0 : part->stalls + 1;
+    part->t = reached;
+    if (advance == ADVANCE_ENDED)
+        return schedule_over(schedule, i);
+    if (part->stalls > MOST_ITERATIONS)
+        return schedule_refuse(schedule, i,
+                               "gets no further than t = %.12g s: each of its last %d steps ended there with an event.",
+                               part->t, MOST_ITERATIONS);
+    return true;
+}
+
+void schedule_predict(Schedule *schedule, uint32_t i)
+{
+    Part *part = &schedule->parts[i];
+    double next;
+    part->t_event = part->t;
+    if (part->t >= schedule->stop) {
+        queue_remove(&schedule->queue, i);
+        return;
+    }
+    Engine *engine = schedule_at(schedule, i);
+    bool ahead = engine_predict(engine, schedule->stop, &next);
+    if (needs_another_method(schedule, i))
+        return;
+    if (ahead && engine->status->prediction == PREDICTION_QUIET && next >= schedule->stop)
+        queue_remove(&schedule->queue, i);
+    else /* A run that ends where it is has no time to announce; its next step says why it ends. */
+        queue_put(&schedule->queue, i, ahead ? next : part->t + engine_time_ulp(part->t));
+}
+
+bool schedule_signals(Schedule *schedule, uint32_t i, double *values)
+{
+    const Group *group = &schedule->groups[schedule->parts[i].group];
+    const double *outputs = NULL;
+    if (group->n_signals == 0)
+        return true;
+    Engine *engine = schedule_at(schedule, i);
+    if (group->sends_outputs && !(outputs = engine_values(engine, VIEW_LIVE, BANK_OUTPUT))) {
+        engine_end_run(engine);
+        return schedule_over(schedule, i);
+    }
+    for (size_t k = 0; k < group->n_signals; k++) {
+        const Signal *signal = &group->signals[k];
+        values[k] = (signal->bank == BANK_OUTPUT ? outputs : engine->live.z)[signal->index];
+    }
+    return true;
+}

@@ -1,0 +1,155 @@
+/* Parts that meet only at events: each is one small block, parts with the same maps share an engine, and only those that
+   something happens to are touched.  The rules of one instant are those of docs/semantics.md, and of
+   hybrid_model/schedule/scheduler.py, which is the same in Python. */
+#ifndef HYBRID_SCHEDULE_H
+#define HYBRID_SCHEDULE_H
+
+#include "parts.h"
+
+#if defined(__GNUC__)
+#pragma GCC visibility push(hidden)
+#endif
+
+#define NOBODY UINT32_MAX
+/* In the place of a jump's index: what a part sends has changed by what it received, without a jump of its own. */
+#define NO_JUMP UINT32_MAX
+/* Event iterations of one part at one instant, and steps of it in a row that lead nowhere, at most. */
+#define MOST_ITERATIONS 10000
+
+/* A scalar that leaves the parts of a group: a state, a discrete state or an output. */
+typedef struct {
+    uint32_t bank, index;
+} Signal;
+
+/* Parts with the same maps. */
+typedef struct {
+    Engine *engine;
+    unsigned char *home;          /* the engine's own block, on which no part runs */
+    unsigned char *slab;          /* the blocks of the parts, one after the other */
+    size_t block_size, inputs_at; /* where in a block its inputs lie */
+    size_t count;
+    uint32_t present;             /* the part on whose block the engine is */
+    Signal *signals;
+    size_t n_signals;
+    bool sends_outputs;
+    double *sent;                 /* of each part: its signals as they were sent last */
+} Group;
+
+typedef struct {
+    double t, t_event;            /* s: where it is, and where its last event was */
+    uint64_t jumps;
+    uint32_t group, member;
+    uint32_t iterations, stalls;
+    bool touched, pending;
+} Part;
+
+/* Predicted events, the earliest first and those of one time in the order of parts: a binary heap that knows where in it
+   each part is. */
+typedef struct {
+    double *times;                /* of each part that is in it */
+    uint32_t *parts, *places;
+    size_t count;
+} Queue;
+
+/* Parts in their order. */
+typedef struct {
+    uint32_t *parts;
+    size_t count;
+} Pending;
+
+/* What has happened, in order: columns that grow. */
+typedef struct {
+    double *times;
+    uint32_t *parts, *jumps;
+    double *values;               /* rows of the part's signals after the event, as wide as the widest group's */
+    size_t count, capacity, width;
+} EventLog;
+
+/* Wires as compressed rows: those that leave part i are first[i] ... first[i + 1] - 1. */
+typedef struct {
+    const uint64_t *first;
+    const uint32_t *signals, *targets, *inputs;
+} Wires;
+
+/* STIFF: a part's flow has shown that its model needs what it has not, a method for stiff flows. */
+typedef enum { SCHEDULE_GOING, SCHEDULE_REACHED, SCHEDULE_ENDED, SCHEDULE_REFUSED, SCHEDULE_STIFF } ScheduleEnd;
+
+typedef struct {
+    Group *groups;
+    size_t n_groups;
+    Part *parts;
+    size_t n_parts;
+    Wires wires;
+    Queue queue;
+    Pending pending;
+    uint32_t *touched, *due;
+    size_t n_touched, n_due;
+    EventLog log;
+    double t, start, stop;        /* s: all events are handled up to t; parts look ahead to stop */
+    uint32_t last_jump;           /* that a part has taken */
+    double *values;               /* of the signals of one part, and which have changed */
+    bool *changed;
+    size_t finished;              /* parts that have been brought to the present target */
+    ScheduleEnd end;
+    uint32_t culprit;             /* the part that has ended the run */
+    char message[MESSAGE_SIZE];
+} Schedule;
+
+/* queue.c */
+bool queue_create(Queue *queue, size_t n_parts);
+void queue_free(Queue *queue);
+/* Puts a part in, or elsewhere. */
+void queue_put(Queue *queue, uint32_t part, double time);
+void queue_remove(Queue *queue, uint32_t part);
+/* The same for the parts that wait for their turn at one instant. */
+void pending_add(Pending *pending, uint32_t part);
+uint32_t pending_take(Pending *pending);
+
+/* event_log.c */
+bool log_event(EventLog *log, double t, uint32_t part, uint32_t jump, const double *signals, size_t n_signals);
+void log_free(EventLog *log);
+
+/* parts.c: one part */
+/* The engine of a part's group, on the block of that part. */
+Engine *schedule_at(Schedule *schedule, uint32_t i);
+unsigned char *schedule_block(const Schedule *schedule, uint32_t i);
+/* Where the inputs of a part lie. */
+double *schedule_inputs(const Schedule *schedule, uint32_t i);
+/* The run is refused, or over; always false. */
+bool schedule_refuse(Schedule *schedule, uint32_t part, const char *format, ...) LIKE_PRINTF(3, 4);
+bool schedule_over(Schedule *schedule, uint32_t part);
+/* How far a part's event may be from t and still be of that instant. */
+double schedule_instant(const Schedule *schedule, uint32_t i, double t);
+/* Brings a part to the target, or to the first event before it; whether it has one there. */
+bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event);
+/* Looks ahead from where a part is, after the events of an instant. */
+void schedule_predict(Schedule *schedule, uint32_t i);
+/* The signals of a part as they are; false, and the run is over, if they cannot be computed. */
+bool schedule_signals(Schedule *schedule, uint32_t i, double *values);
+
+/* instants.c: what happens at one instant */
+/* A part is to be asked for what is due. */
+void schedule_touch(Schedule *schedule, uint32_t i);
+/* Jumps in the order of parts, signals travelling at once, until nothing is due; then all that were touched look ahead. */
+bool schedule_iterate(Schedule *schedule, double t);
+
+/* schedule.c */
+Schedule *schedule_create(size_t n_groups, const Model *const models[], size_t n_parts, const uint32_t groups[]);
+void schedule_free(Schedule *schedule);
+/* The scalars that leave the parts of a group. */
+bool schedule_sends(Schedule *schedule, size_t group, size_t count, const Signal signals[]);
+/* Values of all parts of a group, row by row, in the order of the banks. */
+void schedule_place(Schedule *schedule, size_t group, const double *const values[]);
+/* Puts all parts at `start`, with their start maps if their states are to be computed; maps are not evaluated beyond
+   `stop`. */
+bool schedule_start(Schedule *schedule, double start, double stop, bool computed);
+/* Takes what is due at the start. */
+bool schedule_begin(Schedule *schedule);
+/* Handles events up to the target and brings all parts there; comes back earlier after about so many events. */
+ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t events);
+
+#if defined(__GNUC__)
+#pragma GCC visibility pop
+#endif
+
+#endif

@@ -1,0 +1,154 @@
+"""The scheduler in C and the one in Python: the same events in the same order, and the same states."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from random_scenarios import TRIGGERS, random_scenario
+
+import hybrid_model as hm
+from hybrid_model import consensus
+
+CHANNELS = {
+    "ideal": None,
+    "delay": {"delay": 0.07, "slots": 64},
+    "loss": {"delay": 0.03, "loss": 0.3, "seed": 5, "slots": 64},
+}
+KINDS = sorted(set(TRIGGERS) - {"continuous"})
+"""Agents that see each other's states all the time are no network of parts."""
+
+
+def happened(run):
+    return [(part, jump.name) for part, jump in run.jumps]
+
+
+def assert_alike(network, t_end, **options):
+    """Events the same, times within 1e-8 s and states within 1e-9, at all jumps and between them."""
+    native, plain = (hm.simulate_network(network, t_end, engine=engine, **options) for engine in ("native", "python"))
+    assert native.stop is plain.stop
+    assert happened(native) == happened(plain)
+    times = [[jump.t for _, jump in run.jumps] for run in (native, plain)]
+    np.testing.assert_allclose(*times, rtol=0.0, atol=1e-8)
+    for part, arc in plain.arcs.items():
+        other = native.arcs[part]
+        for one, two in zip(other.jumps, arc.jumps, strict=True):
+            # Rates are of the order of one, so a time within 1e-8 s may move a state as far.
+            np.testing.assert_allclose(one.x_after, two.x_after, rtol=0.0, atol=1e-8)
+            np.testing.assert_allclose(one.z_after, two.z_after, rtol=0.0, atol=1e-8)
+        jumps = np.array([jump.t for jump in arc.jumps])
+        grid = np.linspace(0.0, t_end, 41)
+        apart = grid if not len(jumps) else grid[np.abs(grid[:, None] - jumps).min(axis=1) > 1e-6]
+        apart = apart[apart <= plain.t]
+        for name in ("x", "neighbours"):
+            np.testing.assert_allclose(other.at(name, apart), arc.at(name, apart), rtol=0.0, atol=1e-9)
+
+
+def assert_scenario_alike(seed, trigger, channel, t_end):
+    ideal = trigger in ("relative", "girard", "self-triggered") or channel == "ideal"
+    scenario = random_scenario(seed, trigger, channel=None if ideal else CHANNELS[channel], stop_time=t_end)
+    assert_alike(consensus.closed_loop(scenario), t_end)
+
+
+# Few, and short: each is compiled, and the scheduler in Python takes some ten milliseconds an event.
+@settings(max_examples=3, deadline=None)
+@given(seed=st.integers(0, 10**6), trigger=st.sampled_from(KINDS), channel=st.sampled_from(sorted(CHANNELS)))
+def test_random_scenarios(seed, trigger, channel):
+    assert_scenario_alike(seed, trigger, channel, 0.7)
+
+
+@pytest.mark.long
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10**6), trigger=st.sampled_from(KINDS), channel=st.sampled_from(sorted(CHANNELS)))
+def test_many_random_scenarios(seed, trigger, channel):
+    assert_scenario_alike(seed, trigger, channel, 2.0)
+
+
+NEVER = 1e9
+"""In s: after the runs."""
+
+
+class Counter(hm.HybridAutomaton):
+    """Passes on what it gets, one more; at a time of its own it begins."""
+
+    first = hm.Parameter(NEVER, unit="s")
+    u = hm.Input(0.0, discrete=True)
+    begun = hm.DiscreteState(0, integer=True)
+    seen = hm.DiscreteState(0.0)
+    sent = hm.DiscreteState(0.0, output=True)
+
+    def begins(self, s):
+        return np.where(s.begun > 0.5, np.inf, s.first)
+
+    transitions = (
+        hm.TimeEvent("begin", begins, lambda self, s: {"begun": 1, "sent": s.sent + 1.0}),
+        hm.Jump("pass", lambda self, s: s.u - s.seen - 0.5, lambda self, s: {"seen": s.u, "sent": s.u + 1.0}),
+    )
+
+
+@pytest.mark.parametrize("names", ["abc", "cba"])
+def test_a_cascade_at_one_instant_goes_the_same_way(names):
+    parts = {name: Counter(first=1.0 if name == "a" else NEVER) for name in names}
+    network = hm.Composition("chain", parts, {"b.u": "a.sent", "c.u": "b.sent"})
+    runs = [hm.simulate_network(network, 2.0, engine=engine) for engine in ("native", "python")]
+    assert happened(runs[0]) == happened(runs[1])
+    assert sorted(happened(runs[0])) == [("a", "begin"), ("b", "pass"), ("c", "pass")]
+    assert {jump.t for _, jump in runs[0].jumps} == {1.0}
+
+
+def test_parts_that_answer_each_other_without_end_are_refused_by_name():
+    network = hm.Composition("talk", {"a": Counter(first=1.0), "b": Counter()}, {"b.u": "a.sent", "a.u": "b.sent"})
+    for engine in ("native", "python"):
+        run = hm.simulate_network(network, 2.0, zeno=hm.ZenoGuard(jumps_at_once=20), engine=engine)
+        assert run.stop is hm.Stop.ZENO
+        assert "part b" in run.message or "part a" in run.message
+        assert run.t == 1.0
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+def test_the_jumps_of_each_part_are_bounded(engine):
+    class Clock(hm.HybridAutomaton):
+        period = hm.Parameter(1.0)
+        count = hm.DiscreteState(0, integer=True)
+        transitions = (
+            hm.TimeEvent("tick", lambda self, s: s.period * (s.count + 1), lambda self, s: {"count": s.count + 1}),
+        )
+
+    network = hm.product("clocks", Clock("slow", period=1.0), Clock("fast", period=0.1))
+    run = hm.simulate_network(network, 9.0, zeno=hm.ZenoGuard(max_jumps=20), engine=engine)
+    assert run.stop is hm.Stop.JUMPS
+    assert "part fast" in run.message
+    assert run.t == pytest.approx(2.0)
+    assert len(run.arcs["slow"].jumps) in (1, 2)
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+def test_what_a_part_makes_of_its_state_is_told_with_its_name(engine):
+    class Breaks(hm.HybridAutomaton):
+        x = hm.State(1.0, output=True)
+
+        def flow_map(self, s):
+            return {"x": -1.0}
+
+        transitions = (hm.Jump("break", lambda self, s: -s.x, lambda self, s: {"x": np.inf}),)
+
+    network = hm.product("pair", Breaks("left"), Breaks("right", x=0.5))
+    with pytest.raises(hm.SimulationError, match=r"right"):
+        hm.simulate_network(network, 2.0, engine=engine)
+
+
+def test_stiff_parts_run_with_a_method_for_them():
+    class Fast(hm.HybridAutomaton):
+        x = hm.State(1.0, output=True)
+        y = hm.State(0.0)
+        sent = hm.DiscreteState(0.0, output=True)
+
+        def flow_map(self, s):
+            return {"x": -1e6 * (s.x - np.cos(s.t)), "y": s.x}
+
+        transitions = (hm.Jump("send", lambda self, s: s.y - s.sent - 0.3, lambda self, s: {"sent": s.y}),)
+
+    network = hm.product("stiff", Fast("a"), Fast("b", x=0.5))
+    run = hm.simulate_network(network, 1.0, engine="native")
+    whole = hm.simulate(network, 1.0, engine="native")
+    for part in "ab":
+        assert run.event_times(part, "send") == pytest.approx(whole.event_times(f"{part}.send"), abs=1e-8)
