@@ -6,12 +6,15 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy.typing as npt
+
 from hybrid_model.declare.arguments import (
     real_number,
     require_automaton,
     require_choice,
     require_inputs,
     require_options,
+    require_starts,
 )
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.calls import explained
@@ -41,6 +44,7 @@ def simulate(
     *,
     t_start: float = 0.0,
     inputs: Mapping[str, InputValue] | None = None,
+    starts: Mapping[str, npt.ArrayLike] | None = None,
     solver: Solver | None = None,
     zeno: ZenoGuard | None = None,
     engine: str = "auto",
@@ -62,6 +66,10 @@ def simulate(
         the solver steps, and a pulse between two steps goes unseen.
         Tunable parameter -> number, array, or `Signal`: it
         takes the signal's value at the start and at each breakpoint, before the jumps of that instant, and holds it.
+    starts : mapping, optional
+        Name of a state, discrete state, input or parameter, tunable or not -> value in this run in place of the
+        declared one. One automaton so serves many runs, and is compiled once. What declarations say stays: ranges,
+        and whatever a map reads of them.
     solver : Solver, optional
         Method and accuracy.
     zeno : ZenoGuard, optional
@@ -84,10 +92,11 @@ def simulate(
         For times that are not finite or reversed, for options of another type, for values that do not stay finite, and
         if ``engine="native"`` cannot run the automaton.
     DeclarationError
-        If `automaton` is no instance of an automaton, or an input is unknown or has the wrong shape.
+        If `automaton` is no instance of an automaton, or an input or a start value is unknown or has the wrong shape.
     """
     require_automaton("simulate", automaton)
     require_inputs(inputs)
+    require_starts(starts)
     require_options("solver", solver, Solver, first="method")
     require_options("zeno", zeno, ZenoGuard, first="max_jumps")
     require_choice("engine", engine, ENGINES)
@@ -99,7 +108,7 @@ def simulate(
         )
     if not math.isfinite(t_start):
         raise SimulationError(f"the start time of {automaton.name} is {t_start}: give a finite number.")
-    given = Inputs(layout_of(automaton), inputs)
+    given = Inputs(layout_of(automaton), inputs, starts)
     solver, zeno = solver or _SOLVER, zeno or _ZENO
     why = 'python: it was asked for (engine="python").'
     if engine != "python":

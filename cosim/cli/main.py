@@ -19,6 +19,7 @@ _COMMANDS = {
     "paper": ("paper", "reproduce the paper's simulations in all executions"),
     "simulate": ("simulate", "run a scenario"),
     "certify": ("certify", "bounds of a scenario beside what a run shows"),
+    "sweep": ("sweep", "many runs of a scenario with other values, as a table"),
     "export": ("export", "export an automaton or a scenario's agents as FMUs"),
     "cosim": ("cosimulate", "co-simulate a scenario's agents, or run one FMU"),
     "validate": ("validate", "check anybody's FMU"),

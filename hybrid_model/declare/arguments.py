@@ -80,6 +80,18 @@ def require_inputs(given: Any) -> None:
         raise SimulationError(f'inputs = {given!r} is no mapping: write inputs={{"name of the input": value}}.')
 
 
+def require_starts(given: Any) -> None:
+    """Require that start values are None or a mapping.
+
+    Raises
+    ------
+    SimulationError
+        If they are something else.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise SimulationError(f'starts = {given!r} is no mapping: write starts={{"name of the variable": value}}.')
+
+
 def real_number(name: str, given: Any) -> float:
     """Return a number as a float.
 

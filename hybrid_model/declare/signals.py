@@ -13,7 +13,7 @@ import numpy.typing as npt
 from hybrid_model.declare.layout import Layout, Place
 from hybrid_model.declare.real_numbers import real_array, told
 from hybrid_model.declare.signatures import ExplainedCall, require_map
-from hybrid_model.declare.tuning import Steps, tuned_value
+from hybrid_model.declare.tuning import Steps, start_vectors, tuned_value
 from hybrid_model.declare.variables import FloatArray, Kind, Variable, start_array, unknown_name
 from hybrid_model.errors import DeclarationError, SimulationError
 
@@ -55,6 +55,8 @@ class Inputs:
         Input name -> number, array, function of time or `Signal`; inputs not named keep their start values. A tunable
         parameter is given like a discrete input: it takes the value of its `Signal` at the start and at each
         breakpoint, and holds it in between.
+    starts : mapping, optional
+        Name of a state, discrete state, input or parameter -> start value in place of the declared one.
 
     Attributes
     ----------
@@ -67,11 +69,17 @@ class Inputs:
         For an unknown input, a parameter that is not tunable, or a value of the wrong shape.
     """
 
-    def __init__(self, layout: Layout, given: Mapping[str, InputValue] | None = None) -> None:
+    def __init__(
+        self,
+        layout: Layout,
+        given: Mapping[str, InputValue] | None = None,
+        starts: Mapping[str, npt.ArrayLike] | None = None,
+    ) -> None:
         self.layout = layout
-        self._held = layout.start(Kind.INPUT)
+        self._starts = start_vectors(layout, starts)
+        self._held = self._starts[Kind.INPUT]
         self._signals: list[tuple[Place, Callable[[float], npt.ArrayLike], tuple[float, ...]]] = []
-        self._parameters = layout.start(Kind.PARAMETER)
+        self._parameters = self._starts[Kind.PARAMETER]
         self._tuned: list[tuple[Place, Steps]] = []
         breakpoints: list[float] = []
         places = {place.variable.name: place for place in layout.places[Kind.INPUT]}
@@ -96,6 +104,10 @@ class Inputs:
             else:
                 self.hold(name, value)
         self._breakpoints = sorted(breakpoints)
+
+    def start(self, kind: Kind) -> FloatArray:
+        """Return the vector of start values of states or of discrete states."""
+        return self._starts[kind].copy()
 
     def _tune(self, place: Place, value: InputValue) -> list[float]:
         """Take what is given for a parameter, and return its breakpoints."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from hybrid_model.declare.variables import FloatArray, Variable, start_array
+from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.variables import FloatArray, Kind, Variable, start_array, unknown_name
 from hybrid_model.errors import DeclarationError, SimulationError
 
 
@@ -56,17 +57,17 @@ class Steps:
         return self._known[row]
 
 
-def tuned_value(variable: Variable, given: npt.ArrayLike) -> FloatArray:
-    """Return a new value of a tunable parameter, row by row and of its full size.
+def tuned_value(variable: Variable, given: npt.ArrayLike, what: str = "parameter") -> FloatArray:
+    """Return a new value of a variable, row by row and of its full size; `what` it is, for messages.
 
     Raises
     ------
     DeclarationError
-        If it has another shape, is not finite, lies outside the parameter's range, or is a fraction where the parameter
+        If it has another shape, is not finite, lies outside the variable's range, or is a fraction where the variable
         holds whole numbers.
     """
-    value = start_array(f"parameter {variable.name}", given)
-    told = f"parameter {variable.name} is set to {given!r}"
+    value = start_array(f"{what} {variable.name}", given)
+    told = f"{what} {variable.name} is set to {given!r}"
     if value.shape not in ((), variable.shape):
         raise DeclarationError(
             f"{told}, of shape {value.shape}: give one number for all elements, or an array of shape {variable.shape}."
@@ -78,3 +79,32 @@ def tuned_value(variable: Variable, given: npt.ArrayLike) -> FloatArray:
     if variable.integer and (value != np.round(value)).any():
         raise DeclarationError(f"{told}, but it holds whole numbers: round it.")
     return np.full(variable.size, value) if value.shape == () else value.ravel()
+
+
+def start_vectors(layout: Layout, given: Mapping[str, npt.ArrayLike] | None) -> dict[Kind, FloatArray]:
+    """Return the start values of states, discrete states, inputs and parameters, with others in place of some.
+
+    Parameters
+    ----------
+    layout : Layout
+        Of the automaton.
+    given : mapping, optional
+        Variable name -> value.
+
+    Raises
+    ------
+    DeclarationError
+        For an unknown name, an output, a state that is computed, or a value that `tuned_value` refuses.
+    """
+    vectors: dict[Kind, FloatArray] = {kind: layout.start(kind) for kind in Kind if kind is not Kind.OUTPUT}
+    places = {place.variable.name: place for kind in vectors for place in layout.places[kind]} if given else {}
+    for name, value in (given or {}).items():
+        if name not in places:
+            raise DeclarationError(f"starts: {unknown_name(layout.owner, name, places)}")
+        variable = places[name].variable
+        if variable.computed:
+            raise DeclarationError(
+                f"starts: {layout.owner}.{name} is computed at the start: give the values that it is computed from."
+            )
+        vectors[variable.kind][places[name].at] = tuned_value(variable, value, "start value of")
+    return vectors

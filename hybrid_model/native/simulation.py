@@ -107,10 +107,9 @@ class _Driver:
     def run(self, span: tuple[float, float], record: Record) -> bool:
         """Run from the start of a span to its end; return whether the run is over before."""
         inputs, (start, end) = self._inputs, span
-        layout = inputs.layout
         breakpoints = inputs.breakpoints_in(start, end)
         u, p = self._outside(start, breakpoints[0] if breakpoints else end)
-        over = not self._run.start([layout.start(Kind.STATE), layout.start(Kind.DISCRETE), u, p], start, end, record)
+        over = not self._run.start([inputs.start(Kind.STATE), inputs.start(Kind.DISCRETE), u, p], start, end, record)
         for k, time in enumerate(breakpoints):
             if over or self._goes_on_to(time, take=False):
                 return True

@@ -93,7 +93,7 @@ class Point:
         self.t = self.t_start = self.t_jump = float(t_start)
         self.t_stop = float(t_stop)
         self.j = 0
-        self.x, self.z = self.layout.start(Kind.STATE), self.layout.start(Kind.DISCRETE)
+        self.x, self.z = self.inputs.start(Kind.STATE), self.inputs.start(Kind.DISCRETE)
         self.tune()
         self._whole = np.array(self.layout.whole, dtype=bool)
         self.nominal = np.concatenate(

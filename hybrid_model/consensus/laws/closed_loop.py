@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import hybrid_model as hm
 from hybrid_model.consensus.laws.agents import ContinuousIntegrator, Integrator, agent
 from hybrid_model.consensus.laws.channels import LossyChannel, link_seeds
@@ -10,6 +13,12 @@ from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 from hybrid_model.consensus.weights.kinds import weights_block
+
+Recipe = tuple[object, Callable[[], Any]]
+"""What decides about a part, as data that compare equal or do not, and what makes the part, or None for no part."""
+
+_KNOW_MORE = (TriggerKind.RELATIVE, TriggerKind.GIRARD, TriggerKind.SELF_TRIGGERED)
+"""Laws that are told what is around them."""
 
 
 def agent_name(number: int) -> str:
@@ -77,24 +86,30 @@ def other_end(scenario: Scenario, edge: int, number: int) -> int:
     return second if first == number else first
 
 
+def agent_recipes(scenario: Scenario, number: int) -> dict[str, Recipe]:
+    """What agent `number` is composed of: argument of `agent` -> what decides about that part, and what makes it."""
+    edges, channel = edges_of(scenario, number), scenario.channel
+    initial, gain = scenario.network.initial[number - 1], scenario.network.gain
+    waveforms = tuple(scenario.weights.waveforms[k] for k in edges)
+    trigger, switching = scenario.trigger, scenario.switching
+    motion = ContinuousIntegrator if trigger.kind is TriggerKind.CONTINUOUS else Integrator
+    around = Surroundings(edges, waveforms, switching, gain)
+    # Thresholds on the error alone know nothing of what is around.
+    known = (edges, waveforms, switching, gain) if trigger.kind in _KNOW_MORE else ()
+    return {
+        "integrator": (
+            (motion, len(edges), initial, gain),
+            lambda: motion(degree=len(edges), x=initial, gain=gain),
+        ),
+        "weights": (waveforms, lambda: weights_block(waveforms)),
+        "trigger": ((trigger, known), lambda: event_generator(trigger, around)),
+        "switching": ((switching, edges), lambda: switching.automaton(edges)),
+        "channel": ((channel, edges), lambda: _channel(scenario, number, edges)),
+    }
+
+
 def _agent(scenario: Scenario, number: int) -> hm.Composition:
-    edges = edges_of(scenario, number)
-    initial = scenario.network.initial[number - 1]
-    motion = ContinuousIntegrator if scenario.trigger.kind is TriggerKind.CONTINUOUS else Integrator
-    return agent(
-        agent_name(number),
-        motion(degree=len(edges), x=initial, gain=scenario.network.gain),
-        weights_block([scenario.weights.waveforms[k] for k in edges]),
-        _trigger(scenario, edges),
-        scenario.switching.automaton(edges),
-        _channel(scenario, number, edges),
-    )
-
-
-def _trigger(scenario: Scenario, edges: list[int]) -> hm.HybridAutomaton:
-    waveforms = [scenario.weights.waveforms[k] for k in edges]
-    around = Surroundings(edges, waveforms, scenario.switching, scenario.network.gain)
-    return event_generator(scenario.trigger, around)
+    return agent(agent_name(number), **{part: make() for part, (_, make) in agent_recipes(scenario, number).items()})
 
 
 def _channel(scenario: Scenario, number: int, edges: list[int]) -> hm.HybridAutomaton | None:

@@ -120,9 +120,17 @@ def communication(scenario: Scenario, event_times: Sequence[ArrayLike], duration
     if len(event_times) != n:
         raise ValueError(f"{len(event_times)} rows of broadcast times for {n} agents; give one row an agent.")
     broadcasts, links, active = [], [], []
+    masks: dict[int, NDArray[np.bool_]] = {}
+
+    def present(t: float) -> NDArray[np.bool_]:
+        phase = scenario.switching.phase(t)
+        if phase not in masks:
+            masks[phase] = scenario.switching.active_at(t)
+        return masks[phase]
+
     for agent, row in enumerate(event_times, start=1):
         times, edges = np.asarray(row, dtype=float), edges_of(scenario, agent)
         broadcasts.append(len(times))
         links.append(len(times) * len(edges))
-        active.append(sum(int(scenario.switching.active_at(t)[edges].sum()) for t in times))
+        active.append(sum(int(np.count_nonzero(present(t)[edges])) for t in times.tolist()))
     return Communication(broadcasts, links, active, scenario.stop_time if duration is None else duration)

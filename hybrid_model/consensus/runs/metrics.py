@@ -37,7 +37,12 @@ States = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 def run_states(scenario: Scenario, arc: HybridArc) -> States:
     """The states of a run of ``closed_loop(scenario)`` as a function of time."""
     names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
-    return lambda times: np.array([arc.at(name, times) for name in names])
+
+    def states(times: NDArray[np.float64]) -> NDArray[np.float64]:
+        values = arc.resample(times, names).values
+        return np.array([values[name] for name in names])
+
+    return states
 
 
 def disagreement(states: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -95,13 +100,16 @@ def performance(
     return Performance(
         integral=_simpson(times, values**2),
         ultimate=float(np.max(values[late])),
-        settling=settling_time(lambda t: disagreement(states(t)), times, wanted),
+        settling=settling_time(lambda t: disagreement(states(t)), times, wanted, values),
         level=wanted,
     )
 
 
 def settling_time(
-    value: Callable[[NDArray[np.float64]], NDArray[np.float64]], times: NDArray[np.float64], level: float
+    value: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    times: NDArray[np.float64],
+    level: float,
+    known: NDArray[np.float64] | None = None,
 ) -> float | None:
     """The time [s] from which on a value stays at or below a level.
 
@@ -113,6 +121,8 @@ def settling_time(
         Ascending grid from the start to the end of the run; an excursion between two of its points is not seen.
     level : float
         Where to settle.
+    known : ndarray, optional
+        The values at `times`, if they have been computed.
 
     Returns
     -------
@@ -120,7 +130,7 @@ def settling_time(
         The last crossing, located to rounding; the start if the value never exceeds the level, None if it does so at
         the end.
     """
-    above = np.flatnonzero(value(times) > level)
+    above = np.flatnonzero((value(times) if known is None else known) > level)
     if not above.size:
         return float(times[0])
     last = int(above[-1])
@@ -130,11 +140,8 @@ def settling_time(
     def excess(t: float) -> float:
         return float(value(np.array([t]))[0]) - level
 
-    return (
-        float(brentq(excess, times[last], times[last + 1], xtol=1e-13))
-        if excess(times[last + 1]) < 0
-        else float(times[last + 1])
-    )
+    end = float(times[last + 1])
+    return float(brentq(excess, times[last], end, xtol=1e-13)) if excess(end) < 0 else end
 
 
 def run_metrics(scenario: Scenario, arc: HybridArc, level: float | None = None) -> dict[str, Any]:

@@ -77,7 +77,8 @@ def run_report(scenario: Scenario, arc: HybridArc) -> RunReport:
         The run of `closed_loop(scenario)`.
     """
     names = [agent_name(i) for i in range(1, scenario.network.agents + 1)]
-    states = np.array([arc[f"{name}.x"] for name in names])
+    samples = arc.samples([f"{name}.x" for name in names])
+    states = np.array([samples[f"{name}.x"] for name in names])
     mean = states.mean(axis=0)
     return RunReport(
         event_times=[broadcast_times(arc, name) for name in names],

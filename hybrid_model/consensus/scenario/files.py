@@ -17,7 +17,7 @@ from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind, trigge
 from hybrid_model.consensus.switching.base import NoSwitching, Switching
 from hybrid_model.consensus.weights.kinds import read_weights
 
-__all__ = ["load_scenario", "preset_names", "read_scenario"]
+__all__ = ["load_scenario", "preset_names", "read_scenario", "scenario_entries"]
 
 MOST_CHANGES = 1e7
 _PRESETS = resources.files("hybrid_model.consensus.scenario") / "presets"
@@ -44,15 +44,59 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     ScenarioError
         If there is no such preset or file, the file is not TOML, or it breaks a rule; the message names the entry.
     """
+    other = _with_other_trigger(name_or_path)
+    if other is not None:
+        return replace(replace_trigger(load_scenario(other[0]), other[1]), name=os.fspath(name_or_path))
+    source, entries, folder = _source(name_or_path)
+    try:
+        return read_scenario(entries, folder)
+    except ScenarioError as error:
+        raise ScenarioError(f"{source}: {error}") from error
+
+
+def scenario_entries(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, Any], Path]:
+    """Return the entries of a preset or a scenario file as parsed, and the folder that names of files count from.
+
+    Parameters
+    ----------
+    name_or_path : str or path
+        As in `load_scenario`; the kind of a trigger behind the name of a preset becomes its ``[trigger] kind``.
+
+    Raises
+    ------
+    ScenarioError
+        If there is no such preset or file, or it is not TOML.
+    """
+    other = _with_other_trigger(name_or_path)
+    if other is not None:
+        entries, folder = scenario_entries(other[0])
+        trigger = {key: value for key, value in entries["trigger"].items() if key in trigger_keys(other[1])}
+        if other[1] is TriggerKind.STATIC:
+            trigger.pop("decay", None)
+        trigger["kind"] = other[1].value
+        return {**entries, "name": os.fspath(name_or_path), "trigger": trigger}, folder
+    _, entries, folder = _source(name_or_path)
+    return entries, folder
+
+
+def _with_other_trigger(name_or_path: str | os.PathLike[str]) -> tuple[str, TriggerKind] | None:
+    """The preset and the trigger that a name such as ``paper-a-static`` stands for; None for other names."""
+    name, names = os.fspath(name_or_path), preset_names()
+    base, _, kind = name.rpartition("-")
+    if base not in names or name in names or kind not in [member.value for member in TriggerKind]:
+        return None
+    return base, TriggerKind(kind)
+
+
+def _source(name_or_path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], Path]:
+    """What a scenario is read from, as messages call it; its entries; and the folder of its files."""
     name = os.fspath(name_or_path)
     if not isinstance(name_or_path, str) or name.endswith(".toml") or os.path.dirname(name):
-        return _load_file(Path(name))
+        source = f"the scenario file {Path(name)}"
+        return source, _parsed(source, _content(Path(name))), Path(name).parent
     names = preset_names()
-    base, _, kind = name.rpartition("-")
     if name in names:
-        return _parse(f"preset '{name}'", (_PRESETS / f"{name}.toml").read_bytes())
-    if base in names and kind in [member.value for member in TriggerKind]:
-        return replace(replace_trigger(load_scenario(base), kind), name=name)
+        return f"preset '{name}'", _parsed(f"preset '{name}'", (_PRESETS / f"{name}.toml").read_bytes()), Path()
     raise ScenarioError(
         f"there is no preset '{name}'.{suggestion(name, names)} Presets: {', '.join(names)}; "
         "a scenario file is given by a path that ends in .toml."
@@ -118,17 +162,16 @@ def require_affordable(scenario: Scenario) -> None:
             )
 
 
-def _load_file(path: Path) -> Scenario:
+def _content(path: Path) -> bytes:
     try:
-        content = path.read_bytes()
+        return path.read_bytes()
     except OSError as error:
         raise ScenarioError(f"the scenario file {path} cannot be read: {error.strerror}.") from error
-    return _parse(f"the scenario file {path}", content, path.parent)
 
 
-def _parse(source: str, content: bytes, folder: Path = Path()) -> Scenario:
+def _parsed(source: str, content: bytes) -> dict[str, Any]:
     try:
-        entries = tomllib.loads(content.decode("utf-8-sig"))
+        return tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise ScenarioError(f"{source} is not a text in UTF-8: byte {error.start} cannot be decoded.") from error
     except ValueError as error:
@@ -136,10 +179,6 @@ def _parse(source: str, content: bytes, folder: Path = Path()) -> Scenario:
         raise ScenarioError(f"{source} is not valid TOML: {str(error).partition(';')[0]}.") from error
     except RecursionError as error:
         raise ScenarioError(f"{source} is not valid TOML: its tables or lists are nested too deeply.") from error
-    try:
-        return read_scenario(entries, folder)
-    except ScenarioError as error:
-        raise ScenarioError(f"{source}: {error}") from error
 
 
 def _subtable(top: Entries, name: str, known: tuple[str, ...]) -> Entries:
