@@ -31,7 +31,11 @@ from hybrid_model.stop import Stop
 from hybrid_model.zeno_guard import ZenoGuard
 
 if TYPE_CHECKING:
-    from hybrid_model.schedule.event_network import NetworkRun, simulate_network
+    from hybrid_model.schedule.event_network import simulate_network
+    from hybrid_model.schedule.event_store import load_network_events
+    from hybrid_model.schedule.network_arrays import Network
+    from hybrid_model.schedule.network_events import NetworkEvents
+    from hybrid_model.schedule.network_run import NetworkRun
     from hybrid_model.verification.report import Verification, Violation
     from hybrid_model.verification.subject import Tolerances
     from hybrid_model.verification.verify import verify
@@ -56,6 +60,8 @@ __all__ = [
     "MinimumDwell",
     "ModalAutomaton",
     "Mode",
+    "Network",
+    "NetworkEvents",
     "NetworkRun",
     "Output",
     "Parameter",
@@ -79,6 +85,7 @@ __all__ = [
     "greatest",
     "least",
     "load_arc",
+    "load_network_events",
     "product",
     "series",
     "simulate",

@@ -10,8 +10,9 @@ parts.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,64 +22,29 @@ from hybrid_model.declare.calls import explained
 from hybrid_model.declare.composition import Composition, ElementWire
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.signals import Inputs, InputValue
-from hybrid_model.declare.variables import FloatArray, Kind, Values, element_names, unknown_name
+from hybrid_model.declare.variables import Kind, Values, element_names
 from hybrid_model.errors import BuildError, SimulationError, TraceError, WiringError
 from hybrid_model.record.arc import HybridArc
 from hybrid_model.record.arc_values import ReceivedValues
-from hybrid_model.record.jump_record import JumpRecord
 from hybrid_model.record.run_record import RunRecord
 from hybrid_model.reference.execution import Execution
 from hybrid_model.schedule.automaton_block import AutomatonBlock
+from hybrid_model.schedule.network_arrays import Network
+from hybrid_model.schedule.network_run import NetworkRun
 from hybrid_model.schedule.scheduler import Scheduler
-from hybrid_model.solver import Method, Solver
+from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
 from hybrid_model.zeno_guard import ZenoGuard
 
 if TYPE_CHECKING:
-    from hybrid_model.native.network_run import EventColumns
+    from hybrid_model.schedule.network_events import NetworkEvents
 
 ENGINES = ("auto", "native", "python")
 
 
-@dataclass(frozen=True, eq=False)
-class NetworkRun:
-    """A run of a network: one hybrid arc for each part, on the part's own hybrid time.
-
-    Attributes
-    ----------
-    arcs : mapping
-        Part -> its arc. What a part received is in its inputs; a reception is no jump of the receiver. After a run on
-        the native engine an arc is made from the events when it is first asked for.
-    stop : Stop
-        Why the run ended; `message` has the particulars.
-    t : float
-        Time in s at which it ended. When one part ends the run, the others end at their last event before.
-    engine : str
-        What ran, and why.
-    """
-
-    arcs: Mapping[str, HybridArc]
-    stop: Stop
-    message: str
-    t: float
-    engine: str = ""
-
-    @property
-    def jumps(self) -> list[tuple[str, JumpRecord]]:
-        """All jumps with the parts that took them, in time; those of one instant in the order of the parts."""
-        found = [(part, jump) for part, arc in self.arcs.items() for jump in arc.jumps]
-        return sorted(found, key=lambda entry: entry[1].t)
-
-    def event_times(self, part: str, jump: str) -> FloatArray:
-        """Return the times in s of one part's jumps of one name."""
-        if part not in self.arcs:
-            raise WiringError(unknown_name("the network (parts)", part, self.arcs))
-        return self.arcs[part].event_times(jump)
-
-
 @explained(solver=Solver, zeno=ZenoGuard)
 def simulate_network(
-    network: Composition,
+    network: Composition | Network,
     t_end: float,
     *,
     t_start: float = 0.0,
@@ -86,12 +52,14 @@ def simulate_network(
     solver: Solver | None = None,
     zeno: ZenoGuard | None = None,
     engine: str = "auto",
+    events_to: str | os.PathLike[str] | None = None,
+    progress: bool = False,
 ) -> NetworkRun:
     """Run a composition whose parts exchange discrete signals only, part by part.
 
     Parameters
     ----------
-    network : Composition
+    network : Composition or Network
         Every wire carries a signal that changes only at jumps. The order of parts is the order of simultaneous jumps.
     t_end, t_start : float
         Times in s.
@@ -106,6 +74,11 @@ def simulate_network(
     engine : {"auto", "native", "python"}
         The scheduler in C, which runs maps that are compiled, or the readable one in Python, which runs any. Default:
         the native one wherever it can; `NetworkRun.engine` says which ran and why.
+    events_to : path, optional
+        A new folder to which events go as they come (native engine only), for `load_network_events`; a run that is
+        interrupted leaves what it has. Default: memory, and files in a passing folder where they become many.
+    progress : bool
+        Whether to tell on stderr how far the run is (native engine only).
 
     Returns
     -------
@@ -130,60 +103,44 @@ def simulate_network(
         raise SimulationError(
             f"the end time is {t_end} s and the start {t_start} s: give finite times, the end not before the start."
         )
-    if not isinstance(network, Composition):
+    if not isinstance(network, (Composition, Network)):
         raise WiringError(
             f"simulate_network runs the parts of a Composition, and {network!r} is none: use simulate; to run faster, "
             "compile the parts and not the whole."
         )
-    _require_discrete(network)
     solver, zeno = solver or Solver(), zeno or ZenoGuard()
-    runs = _executions(network, t_start, t_end, inputs or {}, solver, zeno)
-    why = 'python: it was asked for (engine="python").'
+    span, why = (t_start, t_end), 'python: it was asked for (engine="python").'
+    parts = _given(network, span, inputs or {}, solver, zeno)
     if engine != "python":
         try:
-            return _native_run(network, runs, (t_start, t_end), solver, zeno)
+            # CasADi is imported by whoever runs something, and not by all who import the package.
+            from hybrid_model.schedule.native_network import native_network_run
+
+            return native_network_run(network, parts, span, solver, zeno, events_to=events_to, progress=progress)
         except (TraceError, BuildError) as error:
             why = f"python: {error}"
             if engine == "native":
                 raise SimulationError(f"{network.name} cannot run on the native engine: {error}") from error
-    return _python_run(network, runs, (t_start, t_end), solver, why)
+    if isinstance(network, Network):
+        network = network.composition()
+        parts = _given(network, span, inputs or {}, solver, zeno)
+    return _python_run(network, parts, span, solver, why)
 
 
-def _native_run(
-    network: Composition,
-    runs: Mapping[str, Execution],
+def _given(
+    network: Composition | Network,
     span: tuple[float, float],
+    inputs: Mapping[str, InputValue],
     solver: Solver,
     zeno: ZenoGuard,
-) -> NetworkRun:
-    # CasADi is imported by whoever runs something, and not by all who import the package.
-    from hybrid_model.schedule.native_network import EventTable, RebuiltArcs, StiffPart, joined, run_table
-    from hybrid_model.schedule.part_table import table_of
-
-    for part, run in runs.items():
-        if run.inputs.vary or run.inputs.breakpoints_in(*span):
-            raise TraceError(f"what {part} is given from outside follows time, which networks do in Python only.")
-    chunks: list[EventColumns] = []
-    table = table_of(network, runs, stiff=solver.method in (Method.RADAU, Method.BDF))
-    try:
-        outcome = run_table(table, span, solver, zeno, lambda events, _: chunks.append(events))
-    except StiffPart:
-        # From the start, with the derivatives that another method needs: so the first run is as all later ones.
-        chunks.clear()
-        table = table_of(network, runs, stiff=True)
-        outcome = run_table(table, span, solver, zeno, lambda events, _: chunks.append(events))
-    events = EventTable(joined(chunks), len(runs))
-    starts = list(runs.values())
-    arcs = RebuiltArcs(
-        table,
-        events,
-        (span[0], outcome.t),
-        solver,
-        zeno,
-        outcome,
-        lambda part: (starts[part].automaton, starts[part].inputs),
-    )
-    return NetworkRun(arcs, outcome.stop, outcome.message, outcome.t, "native: its maps are compiled.")
+) -> dict[str, Execution]:
+    """Return the parts of a composition at their start; those of arrays begin in the engine."""
+    if isinstance(network, Composition):
+        _require_discrete(network)
+        return _executions(network, *span, inputs, solver, zeno)
+    if inputs:
+        raise WiringError(f"{network.name}: the inputs of a Network are among its values.")
+    return {}
 
 
 def _python_run(
@@ -272,4 +229,10 @@ def _result(
         read = ReceivedValues(run.automaton, run.inputs, recording.received)
         flows = [replace(flow, z=np.append(flow.z, j)) for j, flow in enumerate(recording.flows)]
         arcs[part] = HybridArc(RunRecord(read, flows, recording.jumps, stop, message, run.event_tolerance))
-    return NetworkRun(arcs, stop, message, t, why)
+    return NetworkRun(arcs, stop, message, t, why, lambda: _events(network, arcs))
+
+
+def _events(network: Composition, arcs: Mapping[str, HybridArc]) -> NetworkEvents:
+    from hybrid_model.schedule.events_of_arcs import events_of_arcs
+
+    return events_of_arcs(network, arcs)

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
-import numpy.typing as npt
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 
 from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.layout import layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind
-from hybrid_model.errors import SchedulingError, SimulationError
-from hybrid_model.native.network_run import NO_JUMP, EventColumns, NativeNetwork, NetworkAdvance, NetworkEnd
-from hybrid_model.native.replay import EVENT, replayed
-from hybrid_model.native.run import Ending, NativeRun
-from hybrid_model.native.simulation import fill_options, require_supported
-from hybrid_model.record.arc import HybridArc
-from hybrid_model.record.arc_values import ReceivedValues
-from hybrid_model.record.row_flows import RowFlows, RowJumps
-from hybrid_model.record.run_record import RunRecord
-from hybrid_model.scales import one_instant
-from hybrid_model.schedule.part_table import ROWS, PartTable
+from hybrid_model.errors import SchedulingError, SimulationError, TraceError
+from hybrid_model.native.network_run import EventColumns, NativeNetwork, NetworkAdvance, NetworkEnd
+from hybrid_model.native.run import Ending
+from hybrid_model.native.simulation import FOR_STIFF_FLOWS, fill_options, require_supported
+from hybrid_model.reference.execution import Execution
+from hybrid_model.schedule.event_store import EventStore
+from hybrid_model.schedule.network_arrays import Network
+from hybrid_model.schedule.network_events import NetworkEvents
+from hybrid_model.schedule.network_run import NetworkRun
+from hybrid_model.schedule.part_table import PartTable, table_of, table_of_arrays
+from hybrid_model.schedule.progress import Progress
+from hybrid_model.schedule.rebuilt_arcs import EventTable, RebuiltArcs
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
 from hybrid_model.zeno_guard import ZenoGuard
@@ -45,14 +45,106 @@ class NetworkOutcome:
     t: float
 
 
+def native_network_run(
+    network: Composition | Network,
+    runs: Mapping[str, Execution],
+    span: tuple[float, float],
+    solver: Solver,
+    zeno: ZenoGuard,
+    *,
+    events_to: str | os.PathLike[str] | None,
+    progress: bool,
+) -> NetworkRun:
+    """Run a network on the scheduler in C.
+
+    Parameters
+    ----------
+    network, span, solver, zeno, events_to, progress
+        See `hybrid_model.schedule.event_network.simulate_network`.
+    runs : mapping
+        The parts of a composition at their start.
+
+    Raises
+    ------
+    TraceError
+        If a part's maps cannot be traced, its inputs follow time, or the engine in C does not step as the solver asks.
+    BuildError
+        If there is no compiler, or it fails.
+    """
+    require_supported(solver)
+    for part, run in runs.items():
+        if run.inputs.vary or run.inputs.breakpoints_in(*span):
+            raise TraceError(f"what {part} is given from outside follows time, which networks do in Python only.")
+    stiff = solver.method in FOR_STIFF_FLOWS
+    try:
+        return _run_once(network, runs, span, solver, zeno, events_to, progress, stiff=stiff)
+    except StiffPart:
+        # From the start, with the derivatives that another method needs: so the first run is as all later ones.
+        return _run_once(network, runs, span, solver, zeno, events_to, progress, stiff=True)
+
+
+def _run_once(
+    network: Composition | Network,
+    runs: Mapping[str, Execution],
+    span: tuple[float, float],
+    solver: Solver,
+    zeno: ZenoGuard,
+    events_to: str | os.PathLike[str] | None,
+    progress: bool,
+    *,
+    stiff: bool,
+) -> NetworkRun:
+    if isinstance(network, Network):
+        table = table_of_arrays(network, *span, stiff=stiff)
+    else:
+        table = table_of(network, runs, stiff=stiff)
+    store = EventStore(table.about, table.width, None if events_to is None else Path(events_to))
+    told = Progress(span, wanted=progress)
+
+    def keep(events: EventColumns, t: float) -> None:
+        store.keep(events)
+        told.note(t, len(events.t))
+
+    try:
+        outcome, ends = run_table(table, span, solver, zeno, keep)
+    except StiffPart:
+        store.discard()
+        raise
+    finally:
+        store.close()
+    columns = store.columns()
+    starts = list(runs.values())
+
+    def declared(part: int) -> tuple[Automaton, Inputs]:
+        if isinstance(network, Network):
+            automaton = network.copy(part)
+            return automaton, Inputs(layout_of(automaton))
+        return starts[part].automaton, starts[part].inputs
+
+    events = EventTable(columns, len(table.names))
+    how = outcome.stop, outcome.message
+    arcs = RebuiltArcs(
+        table, events, (span[0], outcome.t), solver, zeno, *how, lambda: started(table, span, solver, zeno), declared
+    )
+    return NetworkRun(
+        arcs,
+        outcome.stop,
+        outcome.message,
+        outcome.t,
+        "native: its maps are compiled.",
+        lambda: NetworkEvents.of_columns(columns, **table.about),
+        lambda name: table.values_of(ends, name),
+    )
+
+
 class StiffPart(Exception):
     """The flow of a part is stiff, and its compiled maps have no derivatives."""
 
 
 def run_table(
     table: PartTable, span: tuple[float, float], solver: Solver, zeno: ZenoGuard, keep: Keep
-) -> NetworkOutcome:
-    """Run a network from the start to the end of a span.
+) -> tuple[NetworkOutcome, list[dict[Kind, FloatArray]]]:
+    """Run a network from the start to the end of a span, and return how it ended, and the states of all parts then.
 
     Parameters
     ----------
@@ -79,9 +171,7 @@ def run_table(
         If a part asks for event iterations without end.
     """
     network = started(table, span, solver, zeno)
-    going = network is not None and network.begin()
-    assert network is not None
-    advance = NetworkAdvance.GOING if going else network.end.how
+    advance = NetworkAdvance.GOING if network.begin() else network.end.how
     try:
         while advance is NetworkAdvance.GOING:
             keep(network.take_events(), network.time)
@@ -90,9 +180,12 @@ def run_table(
         keep(network.take_events(), network.time)
     if advance is NetworkAdvance.STIFF:
         raise StiffPart
+    groups = range(len(table.groups))
     if advance is NetworkAdvance.REACHED:
-        return NetworkOutcome(Stop.HORIZON, f"{table.name}: reached t = {span[1]:.9g} s.", span[1])
-    return _outcome(table, network.end)
+        outcome = NetworkOutcome(Stop.HORIZON, f"{table.name}: reached t = {span[1]:.9g} s.", span[1])
+    else:
+        outcome = _outcome(table, network.end)
+    return outcome, [{kind: network.read(k, kind) for kind in (Kind.STATE, Kind.DISCRETE)} for k in groups]
 
 
 def started(table: PartTable, span: tuple[float, float], solver: Solver, zeno: ZenoGuard) -> NativeNetwork:
@@ -115,149 +208,3 @@ def _outcome(table: PartTable, end: NetworkEnd) -> NetworkOutcome:
     stop = _STOPS[end.ending]
     extra = f" {stop.value}" if stop is Stop.JUMPS else ""
     return NetworkOutcome(stop, f"{where}: {end.message}{extra}", end.t)
-
-
-def joined(chunks: Sequence[EventColumns]) -> EventColumns:
-    """Return the events of a run that were taken one after the other."""
-    width = chunks[0].values.shape[1] if chunks else 0
-    return EventColumns(
-        np.concatenate([np.zeros(0), *(chunk.t for chunk in chunks)]),
-        np.concatenate([np.zeros(0, np.uint32), *(chunk.part for chunk in chunks)]),
-        np.concatenate([np.zeros(0, np.uint32), *(chunk.jump for chunk in chunks)]),
-        np.concatenate([np.zeros((0, width)), *(chunk.values for chunk in chunks)]),
-    )
-
-
-class EventTable:
-    """The events of a run, part by part.
-
-    Parameters
-    ----------
-    events : EventColumns
-        All of them, in order.
-    parts : int
-        How many parts there are.
-    """
-
-    def __init__(self, events: EventColumns, parts: int) -> None:
-        self.events, self._parts = events, parts
-
-    @functools.cached_property
-    def _rows(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        order = np.argsort(self.events.part, kind="stable")
-        return order, np.searchsorted(self.events.part[order], np.arange(self._parts + 1))
-
-    def rows(self, part: int) -> npt.NDArray[np.int64]:
-        """Return the numbers of a part's events, in order."""
-        order, first = self._rows
-        return order[first[part] : first[part + 1]]
-
-    def of_part(self, table: PartTable, part: int) -> npt.NDArray[np.void]:
-        """Return what happened to a part: its jumps, and what it received over its wires (see `EVENT`)."""
-        events, (order, first) = self.events, table.arrivals
-        own = self.rows(part)
-        own = own[events.jump[own] != NO_JUMP]
-        wires = order[first[part] : first[part + 1]]
-        sent = [self.rows(int(table.sources[wire])) for wire in wires]
-        received = np.concatenate([np.zeros(0, np.int64), *sent])
-        lengths = [len(rows) for rows in sent]
-        inputs = np.repeat(table.wires.inputs[wires], lengths)
-        values = events.values[received, np.repeat(table.wires.signals[wires], lengths)]
-        found = np.zeros(len(own) + len(received), EVENT)
-        rows = np.concatenate([own, received])
-        found["t"], found["of_input"][len(own) :] = events.t[rows], 1
-        found["number"] = np.concatenate([events.jump[own], inputs])
-        found["value"][len(own) :] = values
-        found = found[np.lexsort((found["of_input"], rows))]
-        # A reception may have been sent some rounding before the receiver's own last event.
-        found["t"] = np.maximum.accumulate(found["t"])
-        return found
-
-
-class RebuiltArcs(Mapping[str, HybridArc]):
-    """The hybrid arcs of the parts; each is made from the events when it is first asked for.
-
-    Parameters
-    ----------
-    table : PartTable
-        The parts.
-    events : EventTable
-        What happened.
-    span : (float, float)
-        From the start to where the run ended, in s.
-    solver : Solver
-        Accuracy.
-    zeno : ZenoGuard
-        As in the run.
-    outcome : NetworkOutcome
-        How it ended.
-    declared : callable
-        Number of a part -> its automaton, and its inputs and parameters as they were at the start.
-    """
-
-    def __init__(
-        self,
-        table: PartTable,
-        events: EventTable,
-        span: tuple[float, float],
-        solver: Solver,
-        zeno: ZenoGuard,
-        outcome: NetworkOutcome,
-        declared: Callable[[int], tuple[Automaton, Inputs]],
-    ) -> None:
-        self._table, self._events, self._span = table, events, span
-        self._solver, self._zeno, self._outcome, self._declared = solver, zeno, outcome, declared
-        self._numbers = {name: k for k, name in enumerate(table.names)}
-        self._made: dict[str, HybridArc] = {}
-
-    def __len__(self) -> int:
-        return len(self._numbers)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._numbers)
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._numbers
-
-    def __getitem__(self, name: str) -> HybridArc:
-        if name not in self._made:
-            self._made[name] = self._rebuilt(self._numbers[name])
-        return self._made[name]
-
-    @functools.cached_property
-    def _started(self) -> NativeNetwork:
-        return started(self._table, self._span, self._solver, self._zeno)
-
-    def _rebuilt(self, part: int) -> HybridArc:
-        table = self._table
-        automaton, inputs = self._declared(part)
-        run = NativeRun(table.groups[table.group_of[part]].model)
-        fill_options(run.options, self._solver, self._zeno, layout_of(automaton).sizes[Kind.STATE])
-        starts = [self._started.read_part(part, kind) for kind in ROWS]
-        happened = self._events.of_part(table, part)
-        end = self._span[1]
-        if self._outcome.stop is not Stop.HORIZON:
-            end = max([self._span[0], *happened["t"]])
-        rows, before = replayed(run, starts, (self._span[0], end), happened)
-        read = ReceivedValues(automaton, inputs, _received(starts[2], self._span[0], happened, before))
-        flows = [replace(flow, z=np.append(flow.z, j)) for j, flow in enumerate(RowFlows(rows))]
-        given = self._solver.event_tolerance
-        tolerance = one_instant(end, self._span[0], self._span[0]) if given is None else given
-        outcome = self._outcome
-        engine = "native: its maps are compiled; its flows were made again from the events."
-        return HybridArc(
-            RunRecord(read, flows, RowJumps(rows), outcome.stop, outcome.message, tolerance, engine=engine)
-        )
-
-
-def _received(
-    held: FloatArray, start: float, happened: npt.NDArray[np.void], before: npt.NDArray[np.uint64]
-) -> list[tuple[float, int, FloatArray]]:
-    """Return the hybrid times from which on inputs had other values, and those."""
-    received = [(start, 0, held)]
-    for event, j in zip(happened, before, strict=True):
-        if event["of_input"] and held[event["number"]] != event["value"]:
-            held = held.copy()
-            held[event["number"]] = event["value"]
-            received.append((float(event["t"]), int(j), held))
-    return received

@@ -5,18 +5,21 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition, ElementWire
 from hybrid_model.declare.layout import layout_of
-from hybrid_model.declare.variables import FloatArray, Kind
+from hybrid_model.declare.variables import FloatArray, Kind, unknown_name
+from hybrid_model.errors import DeclarationError
 from hybrid_model.native.kept_models import model_of
 from hybrid_model.native.network_run import NativeNetwork, Numbers, PartGroup, PartWires
 from hybrid_model.native.run import NativeModel
 from hybrid_model.reference.execution import Execution
 from hybrid_model.reference.first_look import checked
+from hybrid_model.schedule.network_arrays import Network
 
 ROWS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
 """What a part begins with, in the order of its rows."""
@@ -57,6 +60,45 @@ class PartTable:
     def network(self) -> NativeNetwork:
         """Return the parts in memory, before the start."""
         return NativeNetwork(self.groups, self.group_of, self.wires)
+
+    @property
+    def width(self) -> int:
+        """How many signals leave a part, at most."""
+        return max((len(group.signals) for group in self.groups), default=0)
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What `NetworkEvents` needs besides the columns of events."""
+        kinds = self.group_of if len(self.groups) > 1 else np.uint32(0)
+        names = [
+            [layout_of(automaton).names(kind)[place] for kind, place in group.signals]
+            for automaton, group in zip(self.automata, self.groups, strict=True)
+        ]
+        jumps = [[info.name for info in automaton.jumps] for automaton in self.automata]
+        return {"jumps": jumps, "kind_of": kinds.tolist(), "signals": names}
+
+    def values_of(self, ends: Sequence[Mapping[Kind, FloatArray]], name: str) -> FloatArray:
+        """Return a state of all parts, one row a part, from the vectors of each group.
+
+        Raises
+        ------
+        DeclarationError
+            If it is no state of all parts, of one shape.
+        """
+        found: list[tuple[FloatArray, tuple[int, ...]]] = []
+        for automaton, vectors in zip(self.automata, ends, strict=True):
+            places = {place.variable.name: place for kind in vectors for place in layout_of(automaton).places[kind]}
+            if name not in places:
+                raise DeclarationError(unknown_name(automaton.name, name, places))
+            variable = places[name].variable
+            found.append((vectors[variable.kind][:, places[name].at], variable.shape))
+        shapes = {shape for _, shape in found}
+        if len(shapes) > 1:
+            raise DeclarationError(f"{self.name}: {name} has several shapes, {shapes}: ask the arcs of single parts.")
+        values = np.empty((len(self.group_of), *shapes.pop())) if shapes else np.empty(0)
+        for k, (rows, shape) in enumerate(found):
+            values[self.group_of == k] = rows.reshape(len(rows), *shape)
+        return values
 
     def starts(self, part: int) -> list[FloatArray]:
         """Return what a part begins with."""
@@ -113,6 +155,57 @@ def table_of(network: Composition, executions: Mapping[str, Execution], *, stiff
     )
     automata = tuple(network.parts[names[0]] for names in members)
     return PartTable(network.name, parts, automata, groups, group_of, row_of, wires, computed=False)
+
+
+def table_of_arrays(network: Network, start: float, stop: float, *, stiff: bool) -> PartTable:
+    """Put a network that is given as arrays into groups; its start values are computed when it starts.
+
+    Parameters
+    ----------
+    network : Network
+        Copies of few parts.
+    start, stop : float
+        Of the run, in s.
+    stiff : bool
+        Whether flows may need a method for stiff ones.
+
+    Raises
+    ------
+    TraceError
+        If a part's maps cannot be traced.
+    BuildError
+        If there is no compiler, or it fails.
+    """
+    sent = list(dict.fromkeys(network.signals.values()))
+    groups = []
+    for k, template in enumerate(network.templates):
+        places = _places(template)
+        run = Execution(template, t_start=start, t_stop=stop)
+        x, z, u, p = (network.rows(k, kind) for kind in ROWS)
+        groups.append(PartGroup(_model(run, stiff=stiff), tuple(places[name] for name in sent), (x, z, u, p)))
+    row_of = np.zeros(network.links.count, np.uint32)
+    for members in network.members:
+        row_of[members] = np.arange(len(members), dtype=np.uint32)
+    links = network.links
+    number = (np.arange(len(links.receivers)) - links.first[links.receivers]).astype(np.uint32)
+    columns = []
+    for into, output in network.signals.items():
+        begins = np.array([_input(template, into) for template in network.templates], np.uint32)
+        inputs = begins[network.group_of[links.receivers]] + number
+        signal = np.full(len(number), sent.index(output), np.uint32)
+        columns.append((links.senders.astype(np.uint32), signal, links.receivers.astype(np.uint32), inputs))
+    wires = [np.concatenate([np.zeros(0, np.uint32), *column]) for column in zip(*columns, strict=True)]
+    empty = [np.zeros(0, np.uint32)] * 4
+    compressed = wires_by_source(links.count, *(wires or empty))
+    of = network.group_of
+    return PartTable(
+        network.name, network.parts, network.templates, tuple(groups), of, row_of, compressed, computed=True
+    )
+
+
+def _input(template: Automaton, name: str) -> int:
+    places = layout_of(template).places[Kind.INPUT]
+    return next(int(place.at.start) for place in places if place.variable.name == name)
 
 
 def _model(run: Execution, *, stiff: bool) -> NativeModel:
