@@ -40,6 +40,8 @@ if TYPE_CHECKING:
     from hybrid_model.verification.subject import Tolerances
     from hybrid_model.verification.verify import verify
 
+__version__ = "0.1.0"
+
 __all__ = [
     "AlgebraicLoopError",
     "Automaton",
@@ -81,6 +83,7 @@ __all__ = [
     "Violation",
     "WiringError",
     "ZenoGuard",
+    "__version__",
     "feedback",
     "greatest",
     "least",

@@ -35,3 +35,11 @@ class SchedulingError(HybridModelError, RuntimeError):
 
 class BuildError(HybridModelError, RuntimeError):
     """Generated or kept C could not be compiled: there is no compiler, or it fails."""
+
+
+class NamingError(HybridModelError, LookupError):
+    """A module, a file or a name in it that a user named cannot be found."""
+
+
+class ImportFailedError(HybridModelError, ImportError):
+    """A module or a file that a user named fails when it is imported."""

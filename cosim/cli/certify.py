@@ -10,12 +10,12 @@ from typing import Any
 
 import hybrid_model as hm
 from cosim.cli.exits import Exit, exit_of, progress
+from cosim.cli.scenarios import scenario_of
 from cosim.errors import UsageError
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.forms import Certified, Quantity
 from hybrid_model.consensus.figures.conservatism import save_certificate_figures
 from hybrid_model.consensus.laws.closed_loop import closed_loop
-from hybrid_model.consensus.scenario.files import load_scenario
 
 SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-audit.md of this project"
 """What the short names in the sources of values mean."""
@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     """Run the command."""
     if options.max_jumps < 1:
         raise UsageError(f"--max-jumps {options.max_jumps}: give a whole number of jumps, 1 or more.")
-    scenario = load_scenario(options.scenario)
+    scenario = scenario_of(options.scenario)
     progress("running the closed loop")
     zeno = hm.ZenoGuard(max_jumps=options.max_jumps)
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=zeno)

@@ -9,13 +9,14 @@ from pathlib import Path
 
 from cosim.cli.exits import Exit, progress, start_values
 from cosim.errors import UsageError
-from cosim.systems.automaton_files import find_automaton, imports_from_here
+from cosim.systems.automaton_files import find_automaton
 from fmu.archives.checks import no_device
 from fmu.archives.writing import check_target
 from fmu.build.platforms import PLATFORMS
 from fmu.describe.variables import Fmi
 from fmu.export import export_fmu
 from hybrid_model import Automaton
+from hybrid_model.named_objects import imports_from, is_target
 
 KINDS = ("cs", "me")
 ALL = "all"
@@ -72,7 +73,7 @@ def _seconds(text: str) -> float:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    with imports_from_here(options.target):
+    with imports_from(options.target):
         stop_time, automata = _automata(options.target, start_values(options.start_value))
         files = {name: options.out / f"{_file_name(name)}.fmu" for name in automata}
         for file in files.values():
@@ -106,8 +107,7 @@ def _file_name(name: str) -> str:
 
 
 def _automata(target: str, starts: dict[str, float]) -> tuple[float | None, dict[str, Automaton]]:
-    _, colon, _ = target.rpartition(":")
-    if not colon or Path(target).suffix == ".toml":
+    if not is_target(target):
         if starts:
             raise UsageError("--start-value goes with module:ClassName; a scenario has its values in its file.")
         # Of what a class of one's own does not need.

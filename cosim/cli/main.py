@@ -12,8 +12,10 @@ from collections.abc import Sequence
 from cosim.cli.exits import Exit
 from cosim.errors import CosimError, UsageError
 from fmu.errors import BuildError, ExportError
-from hybrid_model import HybridModelError
+from hybrid_model import HybridModelError, __version__
+from hybrid_model.consensus.entries import suggestion
 from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.errors import NamingError
 
 _COMMANDS = {
     "paper": ("paper", "reproduce the paper's simulations in all executions"),
@@ -48,9 +50,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Hybrid automata: run them event-exactly, export them as FMUs, co-simulate them.",
         allow_abbrev=False,
     )
+    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     given = sys.argv[1:] if arguments is None else arguments
     called = next((word for word in given if not word.startswith("-")), None)
+    if called is not None and called not in _COMMANDS:
+        parser.error(
+            f"there is no command '{called}'.{suggestion(called, _COMMANDS)} Commands: {', '.join(_COMMANDS)}."
+        )
     for name, (module, purpose) in _COMMANDS.items():
         command = commands.add_parser(name, help=purpose, allow_abbrev=False)
         # Some take long to import.
@@ -59,7 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     try:
         return int(options.run(options))
-    except (ScenarioError, UsageError) as error:
+    except (ScenarioError, UsageError, NamingError) as error:
         return _report(error, Exit.USAGE)
     except KeyboardInterrupt:
         return _INTERRUPTED

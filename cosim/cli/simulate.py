@@ -12,6 +12,7 @@ import numpy as np
 
 import hybrid_model as hm
 from cosim.cli.exits import exit_of, write_csv
+from cosim.cli.scenarios import scenario_of
 from cosim.consensus import in_process_system, network_report
 from cosim.errors import UsageError
 from cosim.masters import run_event_exact
@@ -19,7 +20,6 @@ from cosim.masters.start import require_times
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
 from hybrid_model.consensus.runs.report import RunReport, run_report
 from hybrid_model.consensus.scenario.definition import Scenario
-from hybrid_model.consensus.scenario.files import load_scenario
 
 AUTOMATON_AGENTS = 8
 """Up to this many agents `auto` runs the closed loop as one automaton; beyond, event by event over the network."""
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    scenario = load_scenario(options.scenario)
+    scenario = scenario_of(options.scenario)
     require_times(0.0, scenario.stop_time, options.output_interval, "output interval")
     if options.stop_time is not None:
         scenario = dataclasses.replace(scenario, stop_time=options.stop_time)

@@ -10,8 +10,9 @@ from cosim.errors import MisfitError
 from cosim.fmu_slave import FmuSlave
 from cosim.slave import Slave
 from cosim.system import System
-from cosim.systems.automaton_files import find_automaton, imports_from_here
+from cosim.systems.automaton_files import find_automaton
 from cosim.systems.definition import FMU, Component, SystemDefinition
+from hybrid_model.named_objects import imports_from
 
 
 def assemble(definition: SystemDefinition, *, validate: bool = True) -> System:
@@ -60,6 +61,6 @@ def set_start(slave: Slave, name: str, value: Any) -> None:
 def _slave(component: Component, validate: bool) -> Slave:
     if component.kind == FMU:
         return FmuSlave(component.name, component.source, validate=validate)
-    with imports_from_here(component.source):
+    with imports_from(component.source):
         automaton = find_automaton(component.source, component.arguments)
     return AutomatonSlave(component.name, automaton)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib.metadata import version
 
 from fmu.describe.description import TOLERANCE, Description, start_text, summary
 from fmu.describe.dialects import DIALECTS, Dialect
@@ -15,6 +14,7 @@ from fmu.describe.units import base_unit
 from fmu.describe.variables import Bank, Fmi, FmiType, FmuVariable
 from fmu.describe.xml_text import number, to_bytes, xml_text
 from fmu.standard.capabilities import declared
+from hybrid_model import __version__
 
 LOG_CATEGORIES = {
     "logStatusError": "refused calls, and why a run ended",
@@ -50,7 +50,7 @@ def model_description(description: Description) -> bytes:
             "modelName": xml_text(description.automaton.name),
             dialect.token: description.token,
             "description": xml_text(summary(description.automaton)),
-            "generationTool": f"hybrid-fmu {version('hybrid-fmu')}",
+            "generationTool": f"hybrid-fmu {__version__}",
             "variableNamingConvention": description.convention,
         },
     )

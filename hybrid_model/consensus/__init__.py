@@ -60,7 +60,8 @@ if TYPE_CHECKING:
     from hybrid_model.consensus.scenario.channel import Channel
     from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
     from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
-    from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
+    from hybrid_model.consensus.scenario.own_trigger import OwnTrigger
+    from hybrid_model.consensus.scenario.trigger import Threshold, Trigger, TriggerKind
     from hybrid_model.consensus.switching.cycle import PeriodicSwitching
     from hybrid_model.consensus.switching.joint_connectivity import joint_connectivity_window
     from hybrid_model.consensus.switching.random_sequences import (
@@ -105,6 +106,7 @@ __all__ = [
     "Integrator",
     "JointExcitation",
     "MixedTrigger",
+    "OwnTrigger",
     "PeriodicGains",
     "PeriodicSwitching",
     "PiecewiseWeight",
@@ -122,6 +124,7 @@ __all__ = [
     "StaticTrigger",
     "SwitchingSequence",
     "TabulatedWeights",
+    "Threshold",
     "TreePartition",
     "Trigger",
     "TriggerKind",

@@ -2,10 +2,11 @@
 
 import difflib
 import enum
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeVar
 
 from hybrid_model.consensus.messages import ScenarioError, shown
+from hybrid_model.named_objects import is_target
 
 __all__ = ["Entries", "suggestion"]
 
@@ -53,6 +54,15 @@ class Entries:
     def __contains__(self, key: str) -> bool:
         """Whether the key is given."""
         return key in self._given
+
+    def __iter__(self) -> Iterator[str]:
+        """The keys that are given."""
+        return iter(self._given)
+
+    def target(self, key: str) -> str | None:
+        """The value of a key if it names an object of the user's, as ``file.py:Name`` does; otherwise None."""
+        value = self._given.get(key)
+        return value if isinstance(value, str) and is_target(value) else None
 
     def lists(self, key: str) -> bool:
         """Whether the key is given, as a list."""

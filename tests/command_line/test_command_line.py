@@ -4,11 +4,13 @@ import csv
 import io
 import json
 import sys
+from importlib.metadata import version
 from itertools import pairwise
 
 import pytest
 from small_scenario import small_scenario
 
+import hybrid_model as hm
 from cosim.cli.main import main
 from cosim.cli.paper import FIXED_STEPS
 from fmu.export import export_fmu
@@ -61,6 +63,9 @@ def test_simulate_writes_run_and_trajectory(small, tmp_path, capsys):
     [
         (["simulate", "nowhere"], "no preset 'nowhere'"),
         (["simulate", "missing.toml"], "missing.toml"),
+        (["simulate", "ball.fmu"], "is an FMU, and this command takes a scenario: 'hybrid-fmu cosim ball.fmu'"),
+        (["certify", "ball.py:Ball"], "'hybrid-fmu export ball.py:Ball --out DIR' makes an FMU"),
+        (["simulate", "ball.py"], "'hybrid-fmu export ball.py:ClassName --out DIR'"),
         (["export", "no.such.module:Thing", "--out", "out"], "cannot be found"),
         (["export", "json:JSONDecoder", "--out", "out"], "is not an automaton class"),
     ],
@@ -79,6 +84,20 @@ def test_unknown_commands_and_options_are_status_2(arguments, capsys):
     with pytest.raises(SystemExit) as exit_:
         main(arguments)
     assert exit_.value.code == 2
+
+
+def test_a_slip_in_a_command_gets_a_suggestion(capsys):
+    with pytest.raises(SystemExit):
+        main(["simulte", "paper-a"])
+    assert "there is no command 'simulte'. Did you mean 'simulate'?" in capsys.readouterr().err
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    with pytest.raises(SystemExit) as exit_:
+        main(["--version"])
+    assert exit_.value.code == 0
+    assert capsys.readouterr().out == f"hybrid-fmu {version('hybrid-fmu')}\n"
+    assert hm.__version__ == version("hybrid-fmu")
 
 
 def test_unknown_keys_of_a_scenario_are_named(small, capsys):

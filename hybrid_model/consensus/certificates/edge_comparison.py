@@ -70,7 +70,7 @@ def compare_edge_domain(
     c = scenario.trigger.threshold
     if c <= 0:
         raise ScenarioError(
-            f"the trigger '{scenario.trigger.kind.value}' of {scenario.name} has no threshold c, so nothing scales the "
+            f"the trigger '{scenario.trigger.name}' of {scenario.name} has no threshold c, so nothing scales the "
             "gains; give a static or dynamic one."
         )
     static = replace(scenario, trigger=Trigger(TriggerKind.STATIC, c))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.own_trigger import OwnTrigger
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 __all__ = ["Envelope", "error_envelope", "sampled_threshold"]
@@ -24,6 +25,8 @@ def error_envelope(scenario: Scenario) -> Envelope | None:
         return None
     if trigger.kind is TriggerKind.CONTINUOUS:
         return ()
+    if isinstance(trigger, OwnTrigger):
+        return None if trigger.error_bound is None else trigger.error_bound.exponentials
     if trigger.has_level and trigger.kind is not TriggerKind.SAMPLED:
         return trigger.threshold_in_time.exponentials
     return None

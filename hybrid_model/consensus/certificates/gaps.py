@@ -12,8 +12,10 @@ from scipy.special import lambertw
 
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.energy import energy_radius
+from hybrid_model.consensus.certificates.envelopes import Envelope
 from hybrid_model.consensus.certificates.excited_gap import excited_gap
 from hybrid_model.consensus.graphs.undirected import incidence
+from hybrid_model.consensus.scenario.own_trigger import OwnTrigger
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 __all__ = ["Gaps", "frozen_gap", "growing_gap", "printed_gap"]
@@ -117,7 +119,10 @@ class Gaps:
         envelope = self.bounds.envelope
         if not envelope or self.bounds.worst(0.0) is None:
             return None
-        last = sum(c * math.exp(-decay * end) for c, decay in envelope)
+        needed = self._needed
+        if not needed:
+            return None
+        last = sum(c * math.exp(-decay * end) for c, decay in needed)
         return self._improved(_Term(sum(c for c, _ in envelope), 0.0, last, has_start=True))
 
     def _least(self, gap_of: Callable[[_Term], float | None]) -> float | None:
@@ -127,22 +132,31 @@ class Gaps:
             return max(gap or 0.0, trigger.period)
         return gap
 
+    @property
+    def _needed(self) -> Envelope:
+        """Pairs (c, beta): a broadcast needs an error of their sum ``c exp(-beta t)``; empty if that is not known."""
+        trigger = self.bounds.analysis.scenario.trigger
+        if isinstance(trigger, OwnTrigger):
+            return () if trigger.least_error is None else trigger.least_error.exponentials
+        if trigger.kind is TriggerKind.SAMPLED:
+            # Checks let errors grow beyond the threshold, and still a broadcast needs an error of the threshold.
+            return trigger.threshold_in_time.exponentials
+        return self.bounds.envelope or ()
+
     def _of_thresholds(self, gap_of: Callable[[_Term], float | None]) -> float | None:
-        envelope, trigger = self.bounds.envelope, self.bounds.analysis.scenario.trigger
-        if not envelope:
+        envelope, needed = self.bounds.envelope, self._needed
+        if not envelope or not needed:
             return None
-        slowest = min(decay for _, decay in envelope)
-        # Sampled checks let errors grow beyond the threshold, and still a broadcast needs an error of the threshold.
-        is_sampled = trigger.kind is TriggerKind.SAMPLED
-        gaps = [
-            gap_of(_Term(c, decay, trigger.threshold if is_sampled else c, has_start=decay == slowest))
-            for c, decay in envelope
-        ]
-        known = [gap for gap in gaps if gap is not None]
-        found = [min(known)] if len(known) == len(gaps) else []
+        slowest, levels = min(decay for _, decay in envelope), {decay: c for c, decay in needed}
+        found = []
+        # Error and threshold are compared term by term, which takes the same terms in both.
+        if list(levels) == [decay for _, decay in envelope]:
+            gaps = [gap_of(_Term(c, decay, levels[decay], has_start=decay == slowest)) for c, decay in envelope]
+            known = [gap for gap in gaps if gap is not None]
+            found += [min(known)] if len(known) == len(gaps) else []
         # Errors also stay below the sum of all c, and thresholds above those that do not decay.
-        lasting = sum(c for c, decay in envelope if decay == 0)
-        if lasting and len(envelope) > 1:
+        lasting = sum(c for c, decay in needed if decay == 0)
+        if lasting and (len(envelope) > 1 or not found):
             whole = gap_of(_Term(sum(c for c, _ in envelope), 0.0, lasting, has_start=True))
             found += [] if whole is None else [whole]
         gap = max(found, default=math.inf)

@@ -110,7 +110,7 @@ def network_hypotheses(scenario: Scenario, cycle: float) -> list[CheckedHypothes
         _check(
             Hypothesis.PAPER_TRIGGER,
             is_papers,
-            f"The trigger is '{kind.value}'"
+            f"The trigger is '{scenario.trigger.name}'"
             + ("." if is_papers else "; the paper's theorems are about the static and the dynamic one."),
         ),
         _check(

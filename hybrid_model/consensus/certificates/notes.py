@@ -176,7 +176,7 @@ def _radius_notes(bounds: Bounds) -> Iterator[str]:
             f"{list(least.tree)}), kappa_2^M = {most.kappa2:.6g} (tree {list(most.tree)}); every tree bounds the same "
             f"x_e, so the least rho kappa_2 = {best.radius:.6g} (tree {list(best.tree)}) is a bound."
         )
-    if bounds.envelope and all(decay > 0 for _, decay in bounds.envelope):
+    if bounds.envelope and scenario.trigger.threshold > 0 and all(decay > 0 for _, decay in bounds.envelope):
         held = with_threshold(scenario, scenario.trigger.threshold, 0.0)
         constant = Evidence(Bounds(bounds.analysis.alike(held)))
         numbers = {row.form: row.value(constant) for row in BOUNDS if row.quantity is Quantity.RADIUS and row.in_json}

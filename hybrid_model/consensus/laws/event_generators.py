@@ -13,6 +13,7 @@ from hybrid_model.consensus.laws.self_triggers import SELF_TRIGGERS
 from hybrid_model.consensus.laws.threshold_triggers import DynamicTrigger, MixedTrigger, StaticTrigger
 from hybrid_model.consensus.laws.timed_triggers import PeriodicBroadcast, SampledTrigger
 from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.own_trigger import OwnTrigger
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.switching.base import NoSwitching, Switching, masks
 from hybrid_model.consensus.switching.cycle import SwitchingCycle
@@ -64,6 +65,8 @@ def event_generator(trigger: Trigger, around: Surroundings) -> hm.HybridAutomato
     ScenarioError
         If a self-triggered agent has weights whose future it cannot compute.
     """
+    if isinstance(trigger, OwnTrigger):
+        return trigger.make(len(around.edges), around.gain)
     return _MAKERS[trigger.kind](trigger, around)
 
 

@@ -31,6 +31,14 @@ class EventGenerator(hm.HybridAutomaton):
         """Broadcast the present state."""
         return {"broadcast": s.x, "events": s.events + 1}
 
+    def error_bound(self, s: hm.Values) -> Threshold | None:
+        """What the error never exceeds, from the parameters `s` of a law of one's own; None: nothing is promised."""
+        return None
+
+    def least_error(self, s: hm.Values) -> Threshold | None:
+        """What the error has reached whenever a law of one's own broadcasts; None: nothing is promised."""
+        return None
+
 
 class ThresholdTrigger(EventGenerator):
     """Broadcasts when the error ``e = xhat - x`` reaches a threshold: ``f = |e| - threshold(t)`` (paper, section 4).

@@ -158,7 +158,7 @@ def require_norm_trigger(scenario: Scenario, who: str) -> None:
     """
     if scenario.trigger.kind not in NORM_KINDS:
         names = ", ".join(kind.value for kind in NORM_KINDS)
-        raise ScenarioError(f"[trigger] kind is '{scenario.trigger.kind.value}'; for {who} it must be one of {names}.")
+        raise ScenarioError(f"[trigger] kind is '{scenario.trigger.name}'; for {who} it must be one of {names}.")
     if not scenario.channel.ideal:
         raise ScenarioError(f"[channel] delays or loses broadcasts; {who} have an ideal channel only, so leave it out.")
 

@@ -196,7 +196,7 @@ def replace_trigger(scenario: Scenario, kind: TriggerKind | str) -> Scenario:
             "give it a trigger with kind = 'dynamic' and a decay."
         )
     raise ScenarioError(
-        f"the trigger '{given.kind.value}' of scenario '{scenario.name}' does not have the numbers of the trigger "
+        f"the trigger '{given.name}' of scenario '{scenario.name}' does not have the numbers of the trigger "
         f"'{wanted.value}'; give it a trigger of that kind with its numbers."
     )
 

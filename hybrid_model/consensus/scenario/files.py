@@ -12,6 +12,7 @@ from hybrid_model.consensus.entries import Entries, suggestion
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.channel import IDEAL, Channel
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Underlying, Weights, replace_trigger
+from hybrid_model.consensus.scenario.own_trigger import read_own_trigger
 from hybrid_model.consensus.scenario.read_switching import read_switching
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind, trigger_keys
 from hybrid_model.consensus.switching.base import NoSwitching, Switching
@@ -129,7 +130,7 @@ def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = "
         network=network,
         weights=Weights(read_weights(lambda known: _subtable(top, "weights", known), edge_count, Path(folder))),
         switching=_read_switching(top, network, top.number("stop_time")),
-        trigger=_read_trigger(top),
+        trigger=_read_trigger(top, Path(folder)),
         channel=_read_channel(top),
     )
     require_affordable(scenario)
@@ -181,11 +182,11 @@ def _parsed(source: str, content: bytes) -> dict[str, Any]:
         raise ScenarioError(f"{source} is not valid TOML: its tables or lists are nested too deeply.") from error
 
 
-def _subtable(top: Entries, name: str, known: tuple[str, ...]) -> Entries:
+def _subtable(top: Entries, name: str, known: tuple[str, ...] | None) -> Entries:
     entries = top.raw(name, f"must be a table, written [{name}]")
     if not isinstance(entries, dict):
         raise top.error(name, entries, f"must be a table, written [{name}]")
-    return Entries(f"[{name}]", entries, known)
+    return Entries(f"[{name}]", entries, tuple(entries) if known is None else known)
 
 
 def _read_network(table: Entries) -> Network:
@@ -208,10 +209,13 @@ def _read_switching(top: Entries, network: Network, stop_time: float) -> Switchi
     return read_switching(lambda known: _subtable(top, "switching", known), network, stop_time)
 
 
-def _read_trigger(top: Entries) -> Trigger:
+def _read_trigger(top: Entries, folder: Path) -> Trigger:
     # The kind decides which keys are known, so it is read from a table that accepts whatever is given.
-    given = top.raw("trigger", "must be a table, written [trigger]")
-    kind = _subtable(top, "trigger", tuple(given) if isinstance(given, dict) else ()).choice("kind", TriggerKind)
+    any_kind = _subtable(top, "trigger", None)
+    target = any_kind.target("kind")
+    if target is not None:
+        return read_own_trigger(any_kind, target, folder)
+    kind = any_kind.choice("kind", TriggerKind)
     defaults = trigger_keys(kind)
     table = _subtable(top, "trigger", ("kind", *defaults))
     return Trigger(kind, **{key: table.number(key, default) for key, default in defaults.items()})

@@ -17,7 +17,10 @@ __all__ = ["Threshold", "Trigger", "TriggerKind", "trigger_keys"]
 
 
 class TriggerKind(enum.Enum):
-    """The trigger laws; ``hybrid_model.consensus.laws.event_generators`` makes an automaton of each."""
+    """The trigger laws; ``hybrid_model.consensus.laws.event_generators`` makes an automaton of each.
+
+    OWN is any class of the user's: see `hybrid_model.consensus.scenario.own_trigger`.
+    """
 
     STATIC = "static"
     DYNAMIC = "dynamic"
@@ -28,6 +31,7 @@ class TriggerKind(enum.Enum):
     SAMPLED = "sampled"
     PERIODIC = "periodic"
     CONTINUOUS = "continuous"
+    OWN = "file.py:ClassName"
 
 
 class _Rule(enum.Enum):
@@ -77,6 +81,7 @@ _LAWS = {
     TriggerKind.SAMPLED: _Law({"threshold": _POSITIVE, "decay": _NO_DECAY, "period": _POSITIVE}, has_level=True),
     TriggerKind.PERIODIC: _Law({"period": _POSITIVE}),
     TriggerKind.CONTINUOUS: _Law({}),
+    TriggerKind.OWN: _Law({}),
 }
 
 
@@ -184,6 +189,11 @@ class Trigger:
                 f"[trigger] decay is {self.decay}, but the static trigger has a constant threshold; "
                 "leave decay out or set kind = 'dynamic'."
             )
+
+    @property
+    def name(self) -> str:
+        """What the law is called."""
+        return self.kind.value
 
     @property
     def numbers(self) -> dict[str, Any]:

@@ -175,7 +175,5 @@ class FunctionWeight(Waveform):
 
     @classmethod
     def read(cls, entries: Entries, edges: int, folder: Path) -> tuple[Self, ...]:
-        """Refuse: a file holds no functions."""
-        raise entries.error(
-            "kind", "function", "is for scenarios made in Python (FunctionWeight); sample the function for a file"
-        )
+        """Refuse: a file names the function itself."""
+        raise entries.error("kind", "function", "must name the function, as 'file.py:function'")

@@ -15,6 +15,7 @@ from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.weights.constant import ConstantWeight, ConstantWeights
 from hybrid_model.consensus.weights.function import FunctionWeight
 from hybrid_model.consensus.weights.gated_sine import GatedSine
+from hybrid_model.consensus.weights.own_weight import read_own_weights
 from hybrid_model.consensus.weights.piecewise import PiecewiseWeight
 from hybrid_model.consensus.weights.sampled import SampledWeight
 from hybrid_model.consensus.weights.sine import SineWeight
@@ -25,7 +26,7 @@ __all__ = ["WeightKind", "read_weights", "weights_block"]
 
 
 class WeightKind(enum.Enum):
-    """The kinds of weights; a scenario file can name all of them but FUNCTION, which is given in Python."""
+    """The kinds of weights; for FUNCTION a scenario file names the function itself, as ``file.py:function``."""
 
     GATED_SINE = "gated-sine", GatedSine
     CONSTANT = "constant", ConstantWeight
@@ -50,13 +51,15 @@ class WeightKind(enum.Enum):
         return "kind", *self.waveform.further_keys, *self.waveform.numbers
 
 
-def read_weights(make_entries: Callable[[tuple[str, ...]], Entries], edges: int, folder: Path) -> tuple[Waveform, ...]:
+def read_weights(
+    make_entries: Callable[[tuple[str, ...] | None], Entries], edges: int, folder: Path
+) -> tuple[Waveform, ...]:
     """Read the weights of all edges; docs/scenarios.md lists the keys of each kind.
 
     Parameters
     ----------
     make_entries : callable
-        Makes the entries of the table ``[weights]`` from the keys that it may have.
+        Makes the entries of the table ``[weights]`` from the keys that it may have; None: any.
     edges : int
         Number of edges.
     folder : Path
@@ -67,7 +70,11 @@ def read_weights(make_entries: Callable[[tuple[str, ...]], Entries], edges: int,
     ScenarioError
         If a key is unknown or missing, or a value is of the wrong type or out of range; the message names it.
     """
-    # The kind decides which keys are known, so it is read from a table that accepts them all.
+    # The kind decides which keys are known, so it is read from a table that accepts whatever is given.
+    anything = make_entries(None)
+    target = anything.target("kind")
+    if target is not None:
+        return read_own_weights(anything, target, edges, folder)
     any_kind = make_entries(tuple(dict.fromkeys(key for kind in WeightKind for key in kind.keys)))
     kind = any_kind.choice("kind", WeightKind)
     return kind.waveform.read(make_entries(kind.keys), edges, folder)

@@ -122,7 +122,7 @@ class TestSwitching:
     ("table", "entries", "message"),
     [
         ("weights", {"kind": "sin"}, r"kind is 'sin'; .*Did you mean 'sine'\?"),
-        ("weights", {"kind": "function"}, "kind is 'function'; it is for scenarios made in Python"),
+        ("weights", {"kind": "function"}, "kind is 'function'; it must name the function, as 'file.py:function'"),
         ("weights", {"kind": "sine", "mean": 1, "rate": 1}, "has no 'depth'"),
         ("weights", {"kind": "sine", "mean": 1, "rate": 1, "depth": 2}, "of edge 1: depth is 2.0; it must lie between"),
         ("weights", {"kind": "square", "high": 1, "rate": 1}, "has the unknown key 'rate'"),
