@@ -60,7 +60,7 @@ class FmuSlave(Slave):
         self.variable_step = bool(interface.canHandleVariableCommunicationStepSize)
         self.foresees = self._file.foresees
         self.default_start_time, self.default_stop_time = self._file.start_time, self._file.stop_time
-        self.default_step = self._file.step
+        self.default_step, self.internal_step = self._file.step, self._file.internal_step
         self._calls = FmuCalls(name)
         self._access: FmuAccess | None = None
         self._begun = False

@@ -79,6 +79,8 @@ class Slave(Block):
     """Whether events can be handled by the master, at their exact times."""
     variable_step: bool = True
     """Whether steps may differ in length."""
+    internal_step: float | None = None
+    """Length in s of the steps that its solver makes, if they have one: between them its outputs stand still."""
     default_start_time: float | None = None
     default_stop_time: float | None = None
     default_step: float | None = None

@@ -79,6 +79,12 @@ class System:
         """Return the connections that start at a slave."""
         return self._from[name]
 
+    def is_continuous(self, connection: Connection) -> bool:
+        """Return whether a connection carries a number that changes along flows."""
+        output = self.slaves[connection.source].outputs[connection.output]
+        into = self.slaves[connection.target].inputs[connection.input]
+        return not output.discrete and not into.discrete and into.kind == "number" and not into.whole
+
     @property
     def output_names(self) -> list[str]:
         """Names of all outputs, ``slave.output``."""
@@ -92,7 +98,7 @@ class System:
         MisfitError
             If there is none of that name.
         """
-        slave, port = self._output(name)
+        slave, port = self.output(name)
         return slave.get(port)
 
     def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
@@ -105,7 +111,7 @@ class System:
         """
         outputs: dict[Slave, dict[int, str]] = {}
         for k, name in enumerate(names):
-            slave, port = self._output(name)
+            slave, port = self.output(name)
             outputs.setdefault(slave, {})[k] = port
         readers = [(slave.reader(list(ports.values())), list(ports)) for slave, ports in outputs.items()]
 
@@ -166,7 +172,14 @@ class System:
         for slave in self.slaves.values():
             slave.close()
 
-    def _output(self, name: str) -> tuple[Slave, str]:
+    def output(self, name: str) -> tuple[Slave, str]:
+        """Return the slave and its own name of the output ``slave.output``.
+
+        Raises
+        ------
+        MisfitError
+            If there is none of that name.
+        """
         if name not in self._outputs:
             raise MisfitError(f"{name!r} is not an output; the outputs are {', '.join(self._outputs)}.")
         return self._outputs[name]

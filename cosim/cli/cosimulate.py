@@ -14,8 +14,10 @@ from cosim.cli.exits import exit_of, given_values, progress
 from cosim.cli.run_files import RunFiles
 from cosim.consensus import fmu_system
 from cosim.errors import CosimError, UsageError
-from cosim.masters import run_event_exact, run_fixed_step
+from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
+from cosim.masters.error_controlled import TOLERANCE
+from cosim.masters.fixed_step import ORDERS
 from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
@@ -36,7 +38,7 @@ STEP, OUTPUT_INTERVAL = 0.01, 0.1
 """In s: the communication step and the spacing of the output where nobody proposes one, if they fit into the run."""
 FEWEST, MOST = 10, 100_000
 """Steps of a run where nobody proposes their length."""
-EVENT_EXACT, FIXED_STEP = MASTERS = "event-exact", "fixed-step"
+EVENT_EXACT, ERROR_CONTROLLED, FIXED_STEP = MASTERS = "event-exact", "error-controlled", "fixed-step"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +49,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--master",
         choices=MASTERS,
-        help="default: event-exact; fixed-step for an .fmu without event mode (FMI 2.0) or with steps of one length",
+        help="default: event-exact; error-controlled where signals change along flows; else fixed-step",
+    )
+    parser.add_argument("--tolerance", type=float, help="of the error-controlled master: of each step; default: 1e-9")
+    parser.add_argument(
+        "--order", choices=ORDERS, default=ORDERS[0], help="of the fixed-step master, see docs/cosimulation.md"
     )
     parser.add_argument("--start-time", type=float, help="start of the run in s; default: what an .fmu proposes, or 0")
     parser.add_argument("--stop-time", type=float, help="end of the run in s; an .fmu without a default needs it")
@@ -172,10 +178,13 @@ def _master(
     slaves = list(system.slaves.values())
     proposed = experiment.step_size
     curves = any(isinstance(given, Curve) for given in inputs.values())
-    exact = not curves and all(slave.has_event_mode and slave.variable_step for slave in slaves)
+    flows = any(system.is_continuous(connection) for connection in system.connections)
+    exact = not curves and not flows and all(slave.has_event_mode and slave.variable_step for slave in slaves)
     if experiment.master not in (None, *MASTERS):
         raise UsageError(f"the master {experiment.master!r} is none of {', '.join(MASTERS)}.")
-    if (experiment.master or (EVENT_EXACT if exact else FIXED_STEP)) == FIXED_STEP:
+    able = all(slave.can_restore and slave.variable_step and slave.internal_step is None for slave in slaves)
+    master = experiment.master or (EVENT_EXACT if exact else ERROR_CONTROLLED if flows and able else FIXED_STEP)
+    if master == FIXED_STEP:
         step = _part(t_stop - t_start, STEP) if proposed is None else proposed
         return run_fixed_step(
             system,
@@ -186,15 +195,27 @@ def _master(
             output_interval=experiment.output_interval,
             inputs=inputs,
             watch=files.watch,
+            order=options.order,
         )
     if options.step_size is not None:
-        print("hybrid-fmu: --step-size is for the fixed-step master; this run is event-exact.", file=sys.stderr)
+        print(f"hybrid-fmu: --step-size is for the fixed-step master; this run is {master}.", file=sys.stderr)
     # A step is proposed for masters that need short ones; here it is the output that it would make long.
     dense = proposed is not None and t_stop - t_start > MOST * proposed
     interval = experiment.output_interval
     if interval is None:
         interval = _part(t_stop - t_start, OUTPUT_INTERVAL) if dense or proposed is None else proposed
     rows = bool(options.output_file or options.plot or options.show_plot)
+    if master == ERROR_CONTROLLED:
+        return run_error_controlled(
+            system,
+            t_stop,
+            t_start=t_start,
+            tolerance=TOLERANCE if experiment.tolerance is None else experiment.tolerance,
+            output_interval=interval,
+            record_events=rows,
+            inputs=inputs,
+            watch=files.watch,
+        )
     return run_event_exact(
         system,
         t_stop,
@@ -220,8 +241,17 @@ def _events(slave: str, result: CosimResult) -> str:
     return f"  {slave}: {len(times)} event{'s' * (len(times) != 1)} at {some}{more} s"
 
 
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:MOST_SHOWN]) + (f" and {len(names) - MOST_SHOWN} more" if len(names) > MOST_SHOWN else "")
+
+
 def _text(result: CosimResult) -> str:
     lines = [result.message or f"reached t = {result.t:.9g} s in {result.steps} step{'s' * (result.steps != 1)}"]
+    if len(result.treatment) > 1:
+        ways: dict[str, list[str]] = {}
+        for name, way in result.treatment.items():
+            ways.setdefault(way, []).append(name)
+        lines += [f"  {_some(names)}: {way}" for way, names in ways.items()]
     clocks = sorted({(tick.slave, tick.clock) for tick in result.ticks})
     told = {slave for slave, _ in clocks}
     lines += [_events(name, result) for name in sorted({event.block for event in result.events} - told)]

@@ -39,6 +39,8 @@ class FmuFile:
     description : fmpy.model_description.ModelDescription
     start_time, stop_time, step : float or None
         What the description proposes for a run, in s.
+    internal_step : float or None
+        Length in s of the steps that its solver makes, if they have one.
 
     Raises
     ------
@@ -67,8 +69,9 @@ class FmuFile:
         self.start_time, self.stop_time, self.step = (
             _seconds(getattr(experiment, attribute, None)) for attribute in ("startTime", "stopTime", "stepSize")
         )
+        self.internal_step = _seconds(getattr(self.description.coSimulation, "fixedInternalStepSize", None))
         if self.step is None:
-            self.step = _seconds(getattr(self.description.coSimulation, "fixedInternalStepSize", None))
+            self.step = self.internal_step
 
     @property
     def foresees(self) -> bool:

@@ -80,7 +80,16 @@ class Changes:
         """Set what has changed up to time `t` in s, and the curves."""
         for names in self.take(t).values():
             self.set(names, t)
+        self.follow(t)
+
+    def follow(self, t: float) -> None:
+        """Set the curves to their values at `t` in s."""
         self.set(self._curves, t)
+
+    @property
+    def followed(self) -> list[str]:
+        """Slaves with inputs that follow curves."""
+        return [self._places[name][0] for name in self._curves]
 
     def set(self, names: list[str], t: float) -> None:
         """Set variables to their values at time `t` in s."""

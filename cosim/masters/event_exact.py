@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Curve, Given
 from cosim.masters.start import outputs, require_times, sample_change, sample_end, start_slaves
+from cosim.masters.treatments import exactly
 from cosim.result import CosimResult, Watch
 from cosim.system import System
 from hybrid_model.errors import SchedulingError
@@ -62,7 +63,8 @@ def run_event_exact(
     _require_discrete(system)
     changes = Changes(system, inputs or {}, t_start)
     _refuse_curves(inputs or {})
-    result = CosimResult(t=t_start, watch=watch)
+    treatment = {slave.name: exactly(slave) for slave in system.slaves.values()}
+    result = CosimResult(t=t_start, watch=watch, treatment=treatment)
 
     def row(t: float) -> None:
         sample_change(system, result, t, system.output_names)
@@ -153,5 +155,5 @@ def _require_discrete(system: System) -> None:
         if not port.discrete:
             raise MisfitError(
                 f"{connection} carries a signal that changes along flows; this master exchanges signals at events "
-                "only. Compose the two blocks to one, or use the fixed-step master."
+                "only. Compose the two blocks to one, or use the error-controlled master or the fixed-step one."
             )

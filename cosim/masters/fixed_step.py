@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Given
 from cosim.masters.start import outputs, require_times, sample_end, start_slaves
+from cosim.masters.treatments import by_fixed_steps
 from cosim.result import CosimResult, Watch
 from cosim.system import System
 
+ORDERS = ("jacobi", "gauss-seidel")
 ROUNDING = 1e-9
 """Relative rounding of a number of steps."""
 
@@ -25,6 +27,7 @@ def run_fixed_step(
     output_interval: float | None = None,
     inputs: Mapping[str, Given] | None = None,
     watch: Watch | None = None,
+    order: str = "jacobi",
 ) -> CosimResult:
     """Run a system with a fixed communication step; slaves handle their events inside.
 
@@ -49,6 +52,9 @@ def run_fixed_step(
         or, where there is none, at the next. A `Curve` is asked at each communication point.
     watch : callable, optional
         Told of the run after each row; see `CosimResult.watch`.
+    order : {"jacobi", "gauss-seidel"}
+        Whether all slaves step with the signals of the last communication point, or each with what those before it in
+        the system have come to in this step.
 
     Returns
     -------
@@ -70,7 +76,11 @@ def run_fixed_step(
     _require_constant(system, t_stop - t_start, count, step)
     every = 1 if output_interval is None else _steps_between(output_interval, step)
     changes = Changes(system, inputs or {}, t_start)
-    result = CosimResult(t=t_start, watch=watch)
+    if order not in ORDERS:
+        raise CosimError(f"the order is {order!r}: give one of {', '.join(ORDERS)}.")
+    alone = not system.connections
+    treatment = {slave.name: by_fixed_steps(slave, step, alone=alone) for slave in system.slaves.values()}
+    result = CosimResult(t=t_start, watch=watch, treatment=treatment)
     try:
         start_slaves(system, t_start, t_stop, events=False, changes=changes)
         recorded, exchange = system.reader(record), _Exchange(system)
@@ -81,7 +91,7 @@ def run_fixed_step(
         keep(t_start)
         # Time by index: adding up steps would drift (rule 9).
         for k in range(1, count + 1):
-            if not _step_all(system, result, t_stop if k == count else t_start + k * step):
+            if not _step_all(system, result, t_stop if k == count else t_start + k * step, order == "gauss-seidel"):
                 sample_end(system, result, result.t, record)
                 break
             if k % every == 0 or k == count:
@@ -94,13 +104,16 @@ def run_fixed_step(
     return result
 
 
-def _step_all(system: System, result: CosimResult, t_next: float) -> bool:
+def _step_all(system: System, result: CosimResult, t_next: float, hand_on: bool) -> bool:
     for name, slave in system.slaves.items():
         made = slave.step(result.t, t_next)
         result.steps += 1
         if made.terminated:
             result.terminate(name, made.reached, made.terminated)
             return False
+        if hand_on:
+            for wire in system.from_slave(name):
+                system.slaves[wire.target].set(wire.input, wire.carried(slave.get(wire.output)))
     result.t = t_next
     return True
 

@@ -39,8 +39,10 @@ def require_times(t_start: float, t_stop: float, interval: float | None, what: s
         )
 
 
-def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool, changes: Changes) -> None:
+def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool | None, changes: Changes) -> None:
     """Bring all slaves through initialization mode: values from outside first, then those along the connections.
+
+    Events are handled by the master or not; None: in event mode by the slaves that have it.
 
     Raises
     ------
@@ -48,7 +50,7 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool,
         If the start values do not settle: then they depend on each other in a loop.
     """
     for slave in system.slaves.values():
-        slave.start(t_start, t_stop, events=events)
+        slave.start(t_start, t_stop, events=slave.has_event_mode if events is None else events)
     changes.set_start_values()
     known: dict[tuple[str, str], float] = {}
     # A chain of n slaves needs n rounds, and one more to see that nothing changes.

@@ -125,7 +125,7 @@ def test_what_does_not_fit_is_refused(old, new, sentence, folder):
 
 def test_a_master_that_there_is_not_is_refused(folder, capsys):
     assert main(["cosim", str(changed(folder, "stop_time = 2.2", 'stop_time = 2.2\nmaster = "best"'))]) == 2
-    assert "the master 'best' is none of event-exact, fixed-step" in capsys.readouterr().err
+    assert "the master 'best' is none of event-exact, error-controlled, fixed-step" in capsys.readouterr().err
 
 
 def test_a_folder_of_fmus_is_a_system_of_them(stranger, tmp_path, capsys):

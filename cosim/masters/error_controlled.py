@@ -1,0 +1,293 @@
+"""The master for continuous signals between slaves: macro steps with error control, events located on top."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from cosim.errors import CosimError, MisfitError
+from cosim.masters.changes import Changes, Given
+from cosim.masters.event_iteration import iterate_events
+from cosim.masters.macro_step import MacroSteps, Outcome
+from cosim.masters.start import MOST_STEPS, outputs, require_times, sample_change, sample_end, start_slaves
+from cosim.masters.treatments import with_rollback
+from cosim.result import CosimResult, Watch
+from cosim.system import System
+from hybrid_model.declare.variables import FloatArray
+from hybrid_model.schedule.blocks import Termination
+from hybrid_model.schedule.scheduler import ITERATIONS, Event
+
+TOLERANCE = 1e-9
+"""Error of a macro step, as a part of the largest value that each signal has had."""
+RESOLUTION = 1e-12
+"""Of times of events, as a part of the run."""
+FIRST = 1e-3
+"""First macro step, as a part of the run."""
+SAFETY, LEAST, MOST, ORDER = 0.9, 0.2, 5.0, 3
+"""Of the step size control: factors, and the order of the local error."""
+SURPRISE, TINY = 1e4, 1e-300
+"""How far signals may be from what was expected of them, in tolerances; a size above zero."""
+_QUIET, _ROUNDING = 2, 1e-12
+
+
+def run_error_controlled(
+    system: System,
+    t_stop: float,
+    *,
+    t_start: float = 0.0,
+    tolerance: float = TOLERANCE,
+    output_interval: float | None = None,
+    record_events: bool = True,
+    inputs: Mapping[str, Given] | None = None,
+    watch: Watch | None = None,
+) -> CosimResult:
+    """Run a system whose slaves exchange continuous signals, with macro steps of the length that their accuracy needs.
+
+    Each macro step is made once as a whole and once in two halves; half of the difference bounds its error, and a step
+    that is too far off is taken back (Schierz, Arnold and Clauss, 9th Modelica Conference, 2012: error estimate by
+    Richardson's extrapolation and rollback). Where a slave has an event, all return to the start of the step, and the
+    event is enclosed by shorter ones (Broman et al., EMSOFT 2013: rollback to where the first slave stops); then all
+    handle it at one instant.
+
+    Parameters
+    ----------
+    system : System
+        Slaves that can save and restore their state (canGetAndSetFMUState) and take steps of any length. Those with
+        event mode stop at their events; of others an event is seen by what it changes, and enclosed alike.
+    t_stop, t_start : float
+        Times in s.
+    tolerance : float
+        Error of each macro step, as a part of the largest value that each signal has had.
+    output_interval : float, optional
+        Record all outputs at multiples of this time in s; default: only at the end.
+    record_events : bool
+        With an output interval, record them also on both sides of each instant with events.
+    inputs : mapping, optional
+        ``"slave.variable"`` -> number, `hybrid_model.Signal` or `Curve`, for inputs that nothing drives and tunable
+        parameters.
+    watch : callable, optional
+        Told of the run after each row; see `CosimResult.watch`.
+
+    Returns
+    -------
+    CosimResult
+
+    Raises
+    ------
+    MisfitError
+        If a slave can neither return to an earlier state nor take steps of any length.
+    CosimError
+        If a slave fails, gets no further, or the signals between slaves form a loop without a state.
+    """
+    require_times(t_start, t_stop, output_interval, "output interval")
+    if not 0.0 < tolerance < 1.0:
+        raise CosimError(f"the tolerance is {tolerance}: give a number between 0 and 1, such as 1e-9.")
+    _require_rollback(system)
+    changes = Changes(system, inputs or {}, t_start)
+    result = CosimResult(t=t_start, watch=watch)
+    try:
+        start_slaves(system, t_start, t_stop, events=None, changes=changes)
+        run = _Run(system, changes, result, (t_start, t_stop), tolerance, output_interval if record_events else None)
+        run.begin()
+        if output_interval is not None:
+            sample_end(system, result, t_start, system.output_names)
+        count = 1 if output_interval is None else math.ceil((t_stop - t_start) / output_interval * (1.0 - _ROUNDING))
+        for k in range(1, count + 1):
+            grid = t_stop if output_interval is None or k == count else t_start + k * output_interval
+            run.advance_to(grid)
+            if output_interval is not None:
+                sample_end(system, result, result.t, system.output_names)
+            if run.ended:
+                break
+        result.final = outputs(system)
+    finally:
+        system.close()
+    result.steps = run.macro.steps
+    if run.ended:
+        result.terminate(*run.ended)
+    return result
+
+
+def _require_rollback(system: System) -> None:
+    for slave in system.slaves.values():
+        if not slave.can_restore:
+            raise MisfitError(
+                f"{slave.name} cannot return to an earlier state (canGetAndSetFMUState is false), as error control "
+                "needs it: use the fixed-step master."
+            )
+        if not slave.variable_step:
+            raise MisfitError(
+                f"{slave.name} takes steps of one length only (canHandleVariableCommunicationStepSize is false): use "
+                "the fixed-step master."
+            )
+
+
+class _Run:
+    """A run under way: where it is, its macro step, the events so far."""
+
+    def __init__(
+        self,
+        system: System,
+        changes: Changes,
+        result: CosimResult,
+        span: tuple[float, float],
+        tolerance: float,
+        rows: float | None,
+    ) -> None:
+        self._system, self._changes, self._result = system, changes, result
+        self._tolerance, self._rows = tolerance, rows is not None
+        self._t_start, self._t_stop = span
+        length = span[1] - span[0]
+        self._resolution = max(RESOLUTION * length, 16.0 * math.ulp(max(abs(span[0]), abs(span[1]))))
+        self._h = FIRST * length
+        self._largest: FloatArray = np.zeros(0)
+        self._widest: FloatArray = np.zeros(0)
+        self._at_one_time = 0
+        self._until, self._quiet = math.inf, _QUIET
+        self.ended: tuple[str, float, Termination] | None = None
+        self.macro: MacroSteps
+        result.treatment = {slave.name: with_rollback(slave) for slave in system.slaves.values()}
+
+    def begin(self) -> None:
+        """Handle the events of the start."""
+        self.ended = iterate_events(self._system, self._result, self._t_start, lambda: None, entered=True)
+        self.macro = MacroSteps(self._system, self._changes, self._t_start, self._t_stop, self._resolution)
+        self._largest = np.abs(np.array(self.macro.observe(), dtype=np.float64))
+        self._widest = np.abs(self.macro.history.last)
+
+    def advance_to(self, limit: float) -> None:
+        """Go on to `limit` in s, or to the end of the run."""
+        result = self._result
+        for _ in range(MOST_STEPS):
+            if self.ended or result.t >= limit:
+                return
+            due = self._changes.next_time(limit)
+            goal = limit if due is None else max(due, result.t)
+            if goal > result.t + (0.0 if due is None else self._resolution):
+                self._step(min(goal, self._until))
+            elif due is not None:
+                self._happen(goal, set())
+        raise CosimError(f"{self._names()} got no further than t = {result.t:.12g} s in {MOST_STEPS} macro steps.")
+
+    def _step(self, goal: float) -> None:
+        """Make one macro step towards `goal` in s, as long as the accuracy allows, if nothing is in the way.
+
+        A slave with continuous inputs stops where it has its event with the inputs of that step, which are not those of
+        the moment. So steps are halved until their length tells nothing; a slave without any is believed at once.
+        """
+        t, macro, left = self._result.t, self.macro, goal - self._result.t
+        h = left if self._h >= left * (1.0 - 1e-9) else min(self._h, max(0.5 * left, 0.1 * self._h))
+        middle, end = t + 0.5 * h, t + h if h < left else goal
+        states, history = macro.save(), macro.history.copy()
+        try:
+            before = macro.observe()
+            outcome, values = self._attempt(t, end)
+            if h <= 2.0 * self._resolution:
+                outcome.due |= self._jumped(before)
+                self._arrive(end, values, outcome)
+                return
+            if outcome.quiet or outcome.believed:
+                whole = macro.observe()
+                macro.restore(states)
+                outcome, values = self._attempt(t, middle)
+                if outcome.quiet:
+                    macro.history.add(middle, values)
+                    outcome, values = self._attempt(middle, end)
+                    if (outcome.quiet or outcome.believed) and self._is_accurate(whole, end, values, h):
+                        self._arrive(end, values, outcome)
+                        return
+                elif outcome.believed:
+                    outcome = Outcome(early=middle, exact=True)
+            macro.restore(states)
+            macro.history = history
+            self._shorten(t, h, outcome)
+        finally:
+            macro.release(states)
+
+    def _attempt(self, t: float, t_next: float) -> tuple[Outcome, list[float]]:
+        """Attempt a step with the signals as they are expected in its middle."""
+        return self.macro.attempt(t, t_next, self.macro.history.at(0.5 * (t + t_next)))
+
+    def _is_accurate(self, whole: list[float], end: float, values: list[float], h: float) -> bool:
+        """Return whether a step in two halves is accurate, and choose the length of the next one."""
+        halves, signals = np.array(self.macro.observe(), dtype=np.float64), np.array(values, dtype=np.float64)
+        largest = np.maximum(self._largest, np.abs(halves))
+        self._widest = np.maximum(self._widest, np.abs(signals))
+        # Of second order: the error of the halves is a third of the difference.
+        error = np.abs(np.array(whole) - halves) / (3.0 * self._tolerance * np.maximum(largest, TINY))
+        # A signal that has jumped on the way is far from what was expected, whoever has felt it.
+        surprise = np.abs(self.macro.history.at(end) - signals) / np.maximum(self._widest, TINY)
+        worst = float(max(np.max(error, initial=0.0), np.max(surprise, initial=0.0) / (SURPRISE * self._tolerance)))
+        factor = MOST if worst == 0.0 else SAFETY * worst ** (-1.0 / ORDER)
+        if worst > 1.0:
+            self._h = h * min(max(factor, LEAST), 1.0)
+            return False
+        self._largest, self._quiet = largest, self._quiet + 1
+        if self._quiet > _QUIET:
+            self._h = max(self._h if h < self._h else 0.0, h * min(max(factor, LEAST), MOST))
+        return True
+
+    def _jumped(self, before: list[float]) -> set[str]:
+        """Return the slaves without event mode whose outputs are others after a step of no length to speak of."""
+        change = np.abs(np.array(self.macro.observe()) - np.array(before))
+        jumps = change > self._tolerance * np.maximum(self._largest, 1e-300)
+        names = {self.macro.owners[k] for k in np.flatnonzero(jumps)}
+        return {name for name in names if not self._system.slaves[name].has_event_mode}
+
+    def _shorten(self, t: float, h: float, outcome: Outcome) -> None:
+        """Choose the next step after one that had something in its way, or was not accurate."""
+        if outcome.early is not None and outcome.exact and outcome.early > t:
+            self._until = outcome.early
+        elif not outcome.quiet:
+            self._h, self._quiet = 0.5 * h, 0
+
+    def _arrive(self, t: float, values: list[float], outcome: Outcome) -> None:
+        """Take a step that was made, and handle the events at its end."""
+        self._result.t = t
+        if t >= self._until:
+            self._until = math.inf
+        if outcome.pending:
+            # The next step shows the jump.
+            self._h = self._resolution
+        if outcome.ended:
+            self.ended = outcome.ended
+        elif not outcome.due and outcome.early is None:
+            self._at_one_time = 0
+            self.macro.history.add(t, values)
+        else:
+            self._happen(t, outcome.due or set(self._system.slaves))
+            self._h, self._quiet = max(0.1 * self._h, 10.0 * self._resolution), _QUIET
+
+    def _happen(self, t: float, due: set[str]) -> None:
+        """Handle the events at `t` in s."""
+        result, system = self._result, self._system
+        self._at_one_time += 1
+        if self._at_one_time > ITERATIONS:
+            raise CosimError(f"{' and '.join(sorted(due))} gets no further than t = {t:.12g} s.")
+        result.t = t
+        self._row(t)
+        before, shown = len(result.ticks), {name: self._shown(name) for name in due}
+        self.ended = iterate_events(system, result, t, lambda: self._changes.arrive(t))
+        # A slave may stop where its event is about to come; there is one where it shows.
+        seen = {tick.slave for tick in result.ticks[before:]}
+        seen |= {n for n in due if not system.slaves[n].has_event_mode or self._shown(n) != shown[n]}
+        result.events += [Event(t, name) for name in system.slaves if name in seen]
+        if not self.ended:
+            self.macro.history.forget(t, self.macro.signals(t))
+            self.macro.remember()
+        self._row(t)
+
+    def _shown(self, name: str) -> list[Any]:
+        """Return all outputs of a slave."""
+        slave = self._system.slaves[name]
+        return [slave.get(output) for output in slave.outputs]
+
+    def _row(self, t: float) -> None:
+        if self._rows:
+            sample_change(self._system, self._result, t, self._system.output_names)
+
+    def _names(self) -> str:
+        return ", ".join(self._system.slaves)

@@ -1,0 +1,237 @@
+"""One step of all slaves with the continuous signals between them: inputs set, steps made, signals exchanged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from cosim.errors import CosimError
+from cosim.masters.changes import Changes
+from cosim.masters.signal_history import SignalHistory
+from cosim.slave import Slave
+from cosim.system import System
+from hybrid_model.declare.variables import FloatArray
+from hybrid_model.schedule.blocks import Termination
+
+LEAP = 1e-6
+"""Part of a value by which it changes at once if that is a jump."""
+States = list[tuple[Slave, float, Any]]
+"""Slaves, where they are in s, and what they gave to return to it."""
+
+
+@dataclass
+class Outcome:
+    """What a step of all slaves gave.
+
+    Attributes
+    ----------
+    early : float, optional
+        Time in s at which a slave returned with an event; the others are elsewhere.
+    due : set of str
+        Slaves with events at the end of the step.
+    exact : bool
+        Whether a slave stopped that has no continuous inputs, so that its event is where it stopped.
+    pending : bool
+        Whether a slave that handles events inside is about to jump with the inputs that it has at the end.
+    ended : (str, float, Termination) or None
+        The slave that ended the run, when, and why.
+    """
+
+    early: float | None = None
+    due: set[str] = field(default_factory=set)
+    exact: bool = False
+    pending: bool = False
+    ended: tuple[str, float, Termination] | None = None
+
+    @property
+    def quiet(self) -> bool:
+        """Whether nothing happened."""
+        return self.early is None and not self.due and not self.pending and self.ended is None
+
+    @property
+    def believed(self) -> bool:
+        """Whether all are at an event that is where it is."""
+        return self.exact and bool(self.due) and not self.pending and self.early is None and self.ended is None
+
+
+class MacroSteps:
+    """Steps of a system whose slaves have left event mode.
+
+    Within a step an input is constant, as FMI has it: at what it is expected to be in the middle, which is of second
+    order. An event that a slave has because of what its inputs became is seen by a probe: a step of no length to speak
+    of, which is taken back.
+
+    Parameters
+    ----------
+    system : System
+        Started.
+    changes : Changes
+        What comes from outside.
+    t : float
+        Time in s.
+    resolution : float
+        Length of a probe in s.
+
+    Attributes
+    ----------
+    history : SignalHistory
+        Of the continuous connections, and of the outputs of slaves without event mode.
+    observe : callable
+        Returns all outputs that change along flows: what the accuracy is held against.
+    owners : list of str
+        Whose they are.
+    steps : int
+    """
+
+    def __init__(self, system: System, changes: Changes, t: float, t_stop: float, resolution: float) -> None:
+        self._system, self._changes, self._t_stop, self._resolution = system, changes, t_stop, resolution
+        self._flows = [c for c in system.connections if system.is_continuous(c)]
+        self._held = [c for c in system.connections if not system.is_continuous(c)]
+        self._read = system.reader([f"{c.source}.{c.output}" for c in self._flows])
+        self._into: dict[str, list[int]] = {name: [] for name in system.slaves}
+        for k, connection in enumerate(self._flows):
+            self._into[connection.target].append(k)
+        self._fed = {name for name, wires in self._into.items() if wires} | set(changes.followed)
+        self._probed = [s for s in system.slaves.values() if s.has_event_mode and s.name in self._fed]
+        self._leaping = [
+            (s, s.reader([port for port, p in s.outputs.items() if p.kind == "number"]))
+            for s in system.slaves.values()
+            if not s.has_event_mode and s.name in self._fed
+        ]
+        self._inside = [c for c in self._held if not system.slaves[c.source].has_event_mode]
+        names = [name for name in system.output_names if _is_flowing_number(system, name)]
+        self.observe: Callable[[], list[float]] = system.reader(names)
+        self.owners = [system.output(name)[0].name for name in names]
+        self._alone = system.reader([name for name in names if not system.output(name)[0].has_event_mode])
+        self._known: dict[int, Any] = {}
+        self._at = dict.fromkeys(system.slaves, t)
+        self.steps = 0
+        self.history = SignalHistory(t, self.signals(t))
+        self.remember()
+
+    def signals(self, t: float) -> list[float]:
+        """Carry the continuous signals, and return them and the outputs of slaves that say nothing of their events."""
+        return [*self.exchange(t), *self._alone()]
+
+    def exchange(self, t: float) -> list[float]:
+        """Carry the continuous signals to their inputs at `t` in s, and return them.
+
+        Raises
+        ------
+        CosimError
+            If they do not settle: outputs depend on inputs at once, in a loop.
+        """
+        self._changes.follow(t)
+        before: list[float] | None = None
+        for _ in range(len(self._system.slaves) + 1):
+            values = [c.carried(v) for c, v in zip(self._flows, self._read(), strict=True)]
+            if values == before:
+                return values
+            for k, (connection, value) in enumerate(zip(self._flows, values, strict=True)):
+                if before is None or before[k] != value:
+                    self._system.slaves[connection.target].set(connection.input, value)
+            before = values
+        assert before is not None
+        changed = next(c for c, a, b in zip(self._flows, before, self._carried(), strict=True) if a != b)
+        raise CosimError(
+            f"the signals at t = {t:.9g} s do not settle: {changed} and others depend on each other at once, in a "
+            "loop. Break it by a state."
+        )
+
+    def _carried(self) -> list[float]:
+        return [c.carried(v) for c, v in zip(self._flows, self._read(), strict=True)]
+
+    def remember(self) -> None:
+        """Note what the slaves without event mode say at events, to see a change."""
+        self._known = {k: self._system.get(f"{c.source}.{c.output}") for k, c in enumerate(self._inside)}
+
+    def save(self) -> States:
+        """Return the state of all slaves."""
+        return [(slave, self._at[slave.name], slave.save()) for slave in self._system.slaves.values()]
+
+    def restore(self, states: States) -> None:
+        """Return to a state."""
+        for slave, t, state in states:
+            slave.restore(state)
+            self._at[slave.name] = t
+
+    @staticmethod
+    def release(states: States) -> None:
+        """Free a state."""
+        for slave, _, state in states:
+            slave.release(state)
+
+    def attempt(self, t: float, t_next: float, expected: FloatArray) -> tuple[Outcome, list[float]]:
+        """Step all slaves from `t` to `t_next`, in s.
+
+        Parameters
+        ----------
+        t, t_next : float
+        expected : ndarray
+            What the continuous connections are expected to carry in the middle.
+
+        Returns
+        -------
+        outcome : Outcome
+        values : list of float
+            What they carry at the end; empty if a slave was early.
+        """
+        outcome = Outcome()
+        self._changes.follow(0.5 * (t + t_next))
+        for name, slave in self._system.slaves.items():
+            for k in self._into[name]:
+                slave.set(self._flows[k].input, float(expected[k]))
+            made = slave.step(self._at[name], t_next)
+            self.steps += 1
+            if made.reached < self._at[name] - self._resolution or made.reached > t_next + self._resolution:
+                raise CosimError(
+                    f"{name} stepped from {t:.12g} towards {t_next:.12g} s and says that it is at {made.reached:.12g} "
+                    "s: that is outside the step."
+                )
+            if made.terminated:
+                outcome.ended = name, made.reached, made.terminated
+                return outcome, []
+            # Where a slave is may differ from where all are by rounding.
+            self._at[name] = made.reached
+            if made.reached < t_next - self._resolution:
+                outcome.early, outcome.exact = made.reached, name not in self._fed
+                return outcome, []
+            if made.event:
+                outcome.due.add(name)
+                outcome.exact = outcome.exact or name not in self._fed
+        values = self.signals(t_next)
+        outcome.due |= {slave.name for slave in self._probed if self._probe(slave, t_next)}
+        outcome.pending = any(self._leaps(slave, read, t_next) for slave, read in self._leaping)
+        outcome.due |= {
+            c.source for k, c in enumerate(self._inside) if self._system.get(f"{c.source}.{c.output}") != self._known[k]
+        }
+        return outcome, values
+
+    def _probe(self, slave: Slave, t: float) -> bool:
+        """Return whether a slave has an event with the inputs that it has now."""
+        if t + self._resolution > self._t_stop:
+            return False
+        state = slave.save()
+        made = slave.step(self._at[slave.name], t + self._resolution)
+        slave.restore(state)
+        slave.release(state)
+        return made.event or made.terminated is not None
+
+    def _leaps(self, slave: Slave, read: Callable[[], list[float]], t: float) -> bool:
+        """Return whether a slave that handles events inside jumps at once with the inputs that it has now."""
+        if t + self._resolution > self._t_stop:
+            return False
+        state, before = slave.save(), read()
+        made = slave.step(self._at[slave.name], t + self._resolution)
+        after = read()
+        slave.restore(state)
+        slave.release(state)
+        far = any(abs(b - a) > LEAP * max(abs(a), abs(b)) for a, b in zip(before, after, strict=True))
+        return far or made.terminated is not None
+
+
+def _is_flowing_number(system: System, name: str) -> bool:
+    slave, port = system.output(name)
+    output = slave.outputs[port]
+    return output.kind == "number" and not output.discrete and not output.whole

@@ -1,0 +1,28 @@
+"""How masters treat the events of each slave, in words for its result."""
+
+from __future__ import annotations
+
+from cosim.slave import Slave
+
+
+def exactly(slave: Slave) -> str:
+    """Return how the event-exact master treats the events of a slave."""
+    if slave.foresees:
+        return "events predicted by nextEventTime; nothing is rolled back"
+    if slave.can_restore:
+        return "events where it returns early; it goes back to an earlier state if another slave has its event first"
+    return "events where it returns early; it cannot go back, so nobody may send it anything before where it is"
+
+
+def with_rollback(slave: Slave) -> str:
+    """Return how the error-controlled master treats the events of a slave."""
+    if slave.has_event_mode:
+        return "events in event mode, come to by ever shorter steps from states that all slaves return to"
+    return "events inside, come to by ever shorter steps where they change an output"
+
+
+def by_fixed_steps(slave: Slave, step: float, *, alone: bool) -> str:
+    """Return how the fixed-step master treats the events of a slave."""
+    if alone:
+        return "events inside, at the times that it finds"
+    return f"events inside; others hear of them at the next communication point, up to {step:.6g} s late"

@@ -1,0 +1,192 @@
+"""Continuous signals between slaves: the error-controlled master beside composed automata and solutions by hand."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
+from cosim.cli.main import main
+from cosim.errors import CosimError, MisfitError
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_error_controlled, run_fixed_step
+from cosim.masters.changes import Curve
+from cosim.masters.signal_history import SignalHistory
+from cosim.system import System
+from fmu.export import export_fmu
+from hybrid_model.models import BouncingBall
+from hybrid_model.models.ball_on_moving_table import BallOnMovingTable, OscillatingTable
+from hybrid_model.models.event_triggered_lti_loop import EventTriggeredFeedback, EventTriggeredLtiLoop
+from hybrid_model.models.sampled_lti_loop import LtiPlant
+from hybrid_model.schedule.blocks import Step
+
+TIME = 1e-7
+"""Of events, in s: what is promised. Steps are halved to 1e-12 of the run, and the tolerance of a step is 1e-9."""
+ON_A_BALL = {"second.table": "first.h", "second.table_velocity": "first.v"}
+
+
+class Passes(hm.HybridAutomaton):
+    """Its output is its input at once."""
+
+    u = hm.Input(0.0)
+    y = hm.Output()
+    gain = hm.Parameter(1.0)
+
+    def outputs(self, s):
+        return {"y": s.gain * s.u}
+
+
+class Integrates(hm.HybridAutomaton):
+    u = hm.Input(0.0)
+    x = hm.State(0.0, output=True)
+    gain = hm.Parameter(1.0)
+
+    def flow_map(self, s):
+        return {"x": s.gain * s.u}
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory):
+    """The two balls as FMUs of both versions, made when asked for."""
+    folder, made = tmp_path_factory.mktemp("balls"), {}
+    blocks = {"first": BouncingBall(), "second": BallOnMovingTable(h=1.2), "wire": Passes()}
+
+    def fmu(name, version):
+        if (name, version) not in made:
+            made[name, version] = export_fmu(blocks[name], folder / f"{name}{version}.fmu", fmi=version, kinds=("cs",))
+        return made[name, version]
+
+    return fmu
+
+
+@pytest.fixture(scope="module")
+def two_balls():
+    """A ball that falls on a ball: composed, run in one piece."""
+    parts = {"first": BouncingBall(), "second": BallOnMovingTable(h=1.2)}
+    return hm.simulate(hm.Composition("two", parts, ON_A_BALL), 1.6)
+
+
+@pytest.mark.parametrize(("first", "second"), [*itertools.product(("2.0", "3.0"), repeat=2)])
+def test_a_ball_falls_on_a_ball_in_all_versions(first, second, fmus, two_balls):
+    """FMI 2.0 has no events: theirs are seen by what they change."""
+    slaves = [FmuSlave("first", fmus("first", first)), FmuSlave("second", fmus("second", second))]
+    result = run_error_controlled(System(slaves, ON_A_BALL), 1.6)
+    np.testing.assert_allclose(result.event_times("second"), two_balls.event_times("second.jump"), atol=TIME, rtol=0)
+    np.testing.assert_allclose(result.event_times("first"), two_balls.event_times("first.jump"), atol=TIME, rtol=0)
+    for name in ("first.h", "second.h", "second.v"):
+        assert result.final[name] == pytest.approx(two_balls[name][-1], abs=1e-7)
+
+
+def test_a_signal_goes_through_an_fmu_whose_output_follows_at_once(fmus, two_balls):
+    slaves = [FmuSlave("first", fmus("first", "3.0")), FmuSlave("second", fmus("second", "3.0"))]
+    slaves[1:1] = [FmuSlave("h", fmus("wire", "2.0")), FmuSlave("v", fmus("wire", "3.0"))]
+    wires = {"h.u": "first.h", "v.u": "first.v", "second.table": "h.y", "second.table_velocity": "v.y"}
+    result = run_error_controlled(System(slaves, wires), 1.6)
+    np.testing.assert_allclose(result.event_times("second"), two_balls.event_times("second.jump"), atol=TIME, rtol=0)
+
+
+def test_a_ball_on_an_oscillating_table():
+    wires = {"ball.table": "table.height", "ball.table_velocity": "table.velocity"}
+    parts = {"table": OscillatingTable(), "ball": BallOnMovingTable()}
+    expected = hm.simulate(hm.Composition("both", parts, wires), 2.0).event_times("ball.jump")
+    system = System([AutomatonSlave(name, part) for name, part in parts.items()], wires)
+    result = run_error_controlled(system, 2.0)
+    assert len(expected) == 3
+    np.testing.assert_allclose(result.event_times("ball"), expected, atol=TIME, rtol=0)
+    assert [tick.clock for tick in result.ticks] == ["impact"] * 3
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_continuous_plant_under_an_event_triggered_controller(order):
+    A, B, K = ((0.0, 1.0), (-2.0, 3.0)), ((0.0,), (1.0,)), ((1.0, -4.0),)
+    expected = hm.simulate(EventTriggeredLtiLoop(), 1.0).event_times("feedback.update")
+    slaves = [
+        AutomatonSlave("plant", LtiPlant(A=A, B=B, x=(1.0, 0.0))),
+        AutomatonSlave("feedback", EventTriggeredFeedback(K=K, sigma=0.05, floor=1e-9)),
+    ]
+    result = run_error_controlled(System(slaves[::order], {"feedback.x": "plant.x", "plant.u": "feedback.u"}), 1.0)
+    assert len(expected) == 15
+    np.testing.assert_allclose(result.tick_times("feedback", "updated"), expected, atol=TIME, rtol=0)
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
+def test_the_error_follows_the_tolerance(tolerance):
+    """An oscillator in two slaves: x' = y, y' = -x, so x = cos t. Errors of some hundred steps add up."""
+    slaves = [AutomatonSlave("x", Integrates(x=1.0)), AutomatonSlave("y", Integrates(gain=-1.0))]
+    result = run_error_controlled(System(slaves, {"x.u": "y.x", "y.u": "x.x"}), 3.0, tolerance=tolerance)
+    error = abs(result.final["x.x"] - np.cos(3.0))
+    steps = result.steps / 6
+    assert error < tolerance * steps
+    # Of second order: the number of steps goes with the third root.
+    assert steps == pytest.approx(0.35 * 3.0 * tolerance ** (-1.0 / 3.0), rel=0.7)
+
+
+def test_inputs_from_outside_are_followed():
+    """x' = u with u = t and a jump by 1 at 0.5: x = t^2/2 + (t - 0.5)."""
+    system = System([AutomatonSlave("x", Integrates())], {})
+    ramp = Curve(lambda t: t + (1.0 if t >= 0.5 else 0.0), [0.5])
+    result = run_error_controlled(system, 1.0, inputs={"x.u": ramp}, output_interval=0.25)
+    assert result.final["x.x"] == pytest.approx(1.0, abs=1e-9)
+    assert result.times == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
+
+
+def test_signals_that_depend_on_each_other_at_once_are_named():
+    slaves = [AutomatonSlave("a", Passes(gain=2.0)), AutomatonSlave("b", Passes(u=1.0))]
+    with pytest.raises(CosimError, match=r"do not settle: a.y -> b.u and others form a loop|do not settle: b.y -> a.u"):
+        run_error_controlled(System(slaves, {"a.u": "b.y", "b.u": "a.y"}), 1.0)
+
+
+def test_what_cannot_go_back_is_refused_by_name(stranger):
+    system = System([FmuSlave("stranger", stranger(states=False))], {})
+    with pytest.raises(MisfitError, match="stranger cannot return to an earlier state"):
+        run_error_controlled(system, 1.0)
+    system = System([FmuSlave("stranger", stranger(variable=False))], {})
+    with pytest.raises(MisfitError, match="stranger takes steps of one length only"):
+        run_error_controlled(system, 1.0)
+    with pytest.raises(CosimError, match="the tolerance is 0"):
+        run_error_controlled(System([AutomatonSlave("x", Integrates())], {}), 1.0, tolerance=0)
+
+
+def test_a_slave_that_gets_no_further_ends_the_run_with_its_name():
+    class Stuck(AutomatonSlave):
+        def step(self, t, t_next):
+            return super().step(t, t_next) if t_next < 0.5 else Step(t, True)
+
+    slaves = [Stuck("stuck", Integrates()), AutomatonSlave("x", Integrates(x=1.0))]
+    with pytest.raises(CosimError, match=r"stuck.* no further than t = 0\.[45]"):
+        run_error_controlled(System(slaves, {"stuck.u": "x.x"}), 1.0)
+
+
+def test_a_parabola_goes_on_as_one():
+    history = SignalHistory(0.0, [0.0, 1.0])
+    for t in (0.5, 0.7):
+        history.add(t, [t**2, 1.0 - t])
+    np.testing.assert_allclose(history.at(1.3), [1.69, -0.3], atol=1e-15)
+    history.forget(1.0, [5.0, 5.0])
+    np.testing.assert_allclose(history.at(2.0), [5.0, 5.0])
+
+
+def test_each_steps_with_what_those_before_it_have_come_to():
+    """x' = 1 for one, y' = x for the other: the sums are those of rectangles from the left, and from the right."""
+    system = System([AutomatonSlave("x", Integrates(u=1.0)), AutomatonSlave("y", Integrates())], {"y.u": "x.x"})
+    left = run_fixed_step(system, 1.0, 0.1).final["y.x"]
+    right = run_fixed_step(system, 1.0, 0.1, order="gauss-seidel").final["y.x"]
+    assert (left, right) == pytest.approx((0.45, 0.55))
+    with pytest.raises(CosimError, match="the order is 'other': give one of jacobi, gauss-seidel"):
+        run_fixed_step(system, 1.0, 0.1, order="other")
+
+
+def test_the_command_chooses_this_master_for_continuous_signals(tmp_path, capsys):
+    (tmp_path / "system.toml").write_text(
+        "[experiment]\nstop_time = 2.0\n"
+        '[components.table]\nautomaton = "hybrid_model.models.ball_on_moving_table:OscillatingTable"\n'
+        '[components.ball]\nautomaton = "hybrid_model.models.ball_on_moving_table:BallOnMovingTable"\n'
+        '[connections]\n"ball.table" = "table.height"\n"ball.table_velocity" = "table.velocity"\n'
+    )
+    assert main(["cosim", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert "table, ball: events in event mode, come to by ever shorter steps" in said
+    assert "ball.impact: 3 ticks" in said
+    assert main(["cosim", str(tmp_path), "--master", "fixed-step", "--order", "gauss-seidel", "--stop-time", "1"]) == 0
+    assert "others hear of them at the next communication point, up to 0.01 s late" in capsys.readouterr().out
