@@ -30,6 +30,9 @@ from hybrid_model.zeno_guard import ZenoGuard
 
 EVENTS_AT_ONCE = 20_000
 """After so many events a run comes back: what has happened is kept elsewhere, and it can be interrupted."""
+STEPS_AHEAD = 2
+"""Of the solver, in one look ahead of a part: what lies beyond is looked at when the time comes, since an input may have
+changed before."""
 _STOPS = {Ending.ZENO: Stop.ZENO, Ending.BLOCKED: Stop.BLOCKED, Ending.JUMPS: Stop.JUMPS}
 
 Keep = Callable[[EventColumns, float], None]
@@ -193,7 +196,9 @@ def started(table: PartTable, span: tuple[float, float], solver: Solver, zeno: Z
     require_supported(solver)
     network = table.network()
     for k, automaton in enumerate(table.automata):
-        fill_options(network.options(k), solver, zeno, layout_of(automaton).sizes[Kind.STATE])
+        options = network.options(k)
+        fill_options(options, solver, zeno, layout_of(automaton).sizes[Kind.STATE])
+        options.look_ahead_steps = STEPS_AHEAD
     if not network.start(*span, computed=table.computed):
         _outcome(table, network.end)
     return network

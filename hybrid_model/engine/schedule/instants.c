@@ -137,6 +137,7 @@ bool schedule_iterate(Schedule *schedule, double t)
         Part *part = &schedule->parts[schedule->touched[k]];
         part->touched = false;
         part->iterations = 0;
+        part->t_event = part->t;
         schedule_predict(schedule, schedule->touched[k]);
     }
     schedule->n_touched = 0;

@@ -102,7 +102,8 @@ void schedule_predict(Schedule *schedule, uint32_t i)
 {
     Part *part = &schedule->parts[i];
     double next;
-    part->t_event = part->t;
+    schedule->work++;
+    part->unsure = false;
     if (part->t >= schedule->stop) {
         queue_remove(&schedule->queue, i);
         return;
@@ -111,10 +112,16 @@ void schedule_predict(Schedule *schedule, uint32_t i)
     bool ahead = engine_predict(engine, schedule->stop, &next);
     if (needs_another_method(schedule, i))
         return;
-    if (ahead && engine->status->prediction == PREDICTION_QUIET && next >= schedule->stop)
+    Prediction found = (Prediction)engine->status->prediction;
+    if (ahead && found == PREDICTION_QUIET && next >= schedule->stop) {
         queue_remove(&schedule->queue, i);
-    else /* A run that ends where it is has no time to announce; its next step says why it ends. */
-        queue_put(&schedule->queue, i, ahead ? next : part->t + engine_time_ulp(part->t));
+        return;
+    }
+    part->unsure = ahead && found == PREDICTION_RENEWAL;
+    /* An event may be due where a look ahead has ended.  A run that ends where it is has no time to announce; its next
+       step says why it ends. */
+    double now = found == PREDICTION_EVENT ? part->t : part->t + engine_time_ulp(part->t);
+    queue_put(&schedule->queue, i, ahead ? next : now);
 }
 
 bool schedule_signals(Schedule *schedule, uint32_t i, double *values)

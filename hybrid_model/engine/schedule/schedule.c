@@ -211,19 +211,50 @@ static int by_order(const void *a, const void *b)
     return (first > second) - (first < second);
 }
 
+/* Looks further ahead from where a look ahead has ended; nobody else notices. */
+static bool look_further(Schedule *schedule, uint32_t i)
+{
+    bool event = false;
+    double known = schedule->queue.times[i];
+    queue_remove(&schedule->queue, i);
+    if (schedule->parts[i].t < known && !schedule_step(schedule, i, known, &event))
+        return false;
+    schedule_predict(schedule, i);
+    return schedule->end == SCHEDULE_GOING;
+}
+
+/* Whether the first prediction is of an event, at most so late. */
+static bool first_is_sure(Schedule *schedule, double limit)
+{
+    const Queue *queue = &schedule->queue;
+    while (schedule->end == SCHEDULE_GOING && queue->count > 0 && queue->times[queue->parts[0]] <= limit) {
+        if (!schedule->parts[queue->parts[0]].unsure)
+            return true;
+        look_further(schedule, queue->parts[0]);
+        if (schedule->work >= schedule->enough)
+            return false;
+    }
+    return false;
+}
+
 /* The next instant with events up to `limit`; the parts that have them are brought there. */
 static bool next_instant(Schedule *schedule, double limit, double *instant)
 {
     Queue *queue = &schedule->queue;
     bool event;
     schedule->n_due = 0;
-    if (queue->count == 0 || queue->times[queue->parts[0]] > limit)
-        return true;
+    if (!first_is_sure(schedule, limit))
+        return schedule->end == SCHEDULE_GOING;
     double first = *instant = queue->times[queue->parts[0]];
     while (queue->count > 0) {
         uint32_t i = queue->parts[0];
         if (queue->times[i] > fmin(first + schedule_instant(schedule, i, first), limit))
             break;
+        if (schedule->parts[i].unsure) {
+            if (!look_further(schedule, i))
+                return false;
+            continue;
+        }
         *instant = fmax(*instant, queue->times[i]);
         queue_remove(queue, i);
         schedule->due[schedule->n_due++] = i;
@@ -258,16 +289,16 @@ static bool finish(Schedule *schedule, uint32_t i, double target)
     return true;
 }
 
-ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t events)
+ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t work)
 {
-    size_t enough = schedule->log.count + events;
+    schedule->enough = schedule->work + work;
     double instant = schedule->t;
     while (schedule->end == SCHEDULE_GOING && schedule->finished == 0) {
-        if (schedule->log.count >= enough)
+        if (schedule->work >= schedule->enough)
             return SCHEDULE_GOING;
         if (!next_instant(schedule, target, &instant))
             return schedule->end;
-        if (schedule->n_due == 0)
+        if (schedule->n_due == 0 && schedule->work < schedule->enough)
             break;
         for (size_t k = 0; k < schedule->n_due; k++)
             schedule_touch(schedule, schedule->due[k]);

@@ -41,6 +41,7 @@ typedef struct {
     uint32_t group, member;
     uint32_t iterations, stalls;
     bool touched, pending;
+    bool unsure;                  /* its place in the queue is where its look ahead ended, no event */
 } Part;
 
 /* Predicted events, the earliest first and those of one time in the order of parts: a binary heap that knows where in it
@@ -89,6 +90,7 @@ typedef struct {
     uint32_t last_jump;           /* that a part has taken */
     double *values;               /* of the signals of one part, and which have changed */
     bool *changed;
+    size_t work, enough;          /* events and looks ahead so far */
     size_t finished;              /* parts that have been brought to the present target */
     ScheduleEnd end;
     uint32_t culprit;             /* the part that has ended the run */
@@ -122,7 +124,7 @@ bool schedule_over(Schedule *schedule, uint32_t part);
 double schedule_instant(const Schedule *schedule, uint32_t i, double t);
 /* Brings a part to the target, or to the first event before it; whether it has one there. */
 bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event);
-/* Looks ahead from where a part is, after the events of an instant. */
+/* Looks ahead from where a part is, some steps far. */
 void schedule_predict(Schedule *schedule, uint32_t i);
 /* The signals of a part as they are; false, and the run is over, if they cannot be computed. */
 bool schedule_signals(Schedule *schedule, uint32_t i, double *values);
@@ -145,8 +147,9 @@ void schedule_place(Schedule *schedule, size_t group, const double *const values
 bool schedule_start(Schedule *schedule, double start, double stop, bool computed);
 /* Takes what is due at the start. */
 bool schedule_begin(Schedule *schedule);
-/* Handles events up to the target and brings all parts there; comes back earlier after about so many events. */
-ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t events);
+/* Handles events up to the target and brings all parts there; comes back earlier after about so many events and looks
+   ahead. */
+ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t work);
 
 #if defined(__GNUC__)
 #pragma GCC visibility pop
