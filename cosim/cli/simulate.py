@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +14,18 @@ import numpy as np
 import hybrid_model as hm
 from cosim.cli.exits import exit_of, write_csv
 from cosim.cli.scenarios import scenario_of
-from cosim.consensus import in_process_system, network_report
 from cosim.errors import UsageError
-from cosim.masters import run_event_exact
 from cosim.masters.start import require_times
+from hybrid_model.consensus.laws.agent_network import agent_network
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
-from hybrid_model.consensus.runs.report import RunReport, run_report
+from hybrid_model.consensus.runs.report import RunReport, report_of_network, run_report
 from hybrid_model.consensus.scenario.definition import Scenario
 
 AUTOMATON_AGENTS = 8
 """Up to this many agents `auto` runs the closed loop as one automaton; beyond, event by event over the network."""
 
+MOST_AT_EVENTS = 5_000_000
+"""Agents times events: beyond, the trajectory is on its grid only."""
 MOST_POINTS = 1e7
 """Of a trajectory; one that is longer fills the memory."""
 
@@ -52,7 +54,7 @@ def run(options: argparse.Namespace) -> int:
         scenario = dataclasses.replace(scenario, stop_time=options.stop_time)
     _require_points(scenario.stop_time, options.output_interval)
     one = options.engine == "automaton" or (options.engine == "auto" and scenario.network.agents <= AUTOMATON_AGENTS)
-    report, times, signals = (_as_one if one else _as_network)(scenario, options.output_interval)
+    report, times, signals = (_as_one if one else _as_network)(scenario, options.output_interval, bool(options.out))
     document = json.dumps({"scenario": scenario.name, **report.as_dict(), "message": report.message}, indent=2)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
@@ -70,7 +72,7 @@ def _require_points(stop_time: float, interval: float) -> None:
         )
 
 
-def _as_one(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[str, Any]]:
+def _as_one(scenario: Scenario, interval: float, wanted: bool) -> tuple[RunReport, Any, dict[str, Any]]:
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
     end = float(arc.t[-1])
     times = np.minimum(np.arange(int(np.ceil(end / interval)) + 1) * interval, end)
@@ -79,7 +81,10 @@ def _as_one(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[s
     names = [f"{agent_name(i)}.{item}" for i in range(1, scenario.network.agents + 1) for item in ("x", "broadcast")]
     # Both rows of a jump: where something has one, its value before comes first.
     rows, before = _both_sides(times, np.isin(times, jumps))
-    signals = {name: np.where(before, arc.at(name, rows, before=True), arc.at(name, rows)).tolist() for name in names}
+    signals = {
+        name: np.where(before, arc.at(name, rows, before=True), arc.at(name, rows)).tolist()
+        for name in (names if wanted else ())
+    }
     return run_report(scenario, arc), rows.tolist(), signals
 
 
@@ -92,12 +97,21 @@ def _both_sides(times: Any, jumps: Any) -> tuple[Any, Any]:
     return rows, before
 
 
-def _as_network(scenario: Scenario, interval: float) -> tuple[RunReport, Any, dict[str, Any]]:
-    result = run_event_exact(
-        in_process_system(scenario), scenario.stop_time, output_interval=interval, record_events=True
-    )
-    signals = {name: values for name, values in result.signals.items() if name.endswith((".x", ".broadcast"))}
-    return network_report(scenario, result), result.times, signals
+def _as_network(scenario: Scenario, interval: float, wanted: bool) -> tuple[RunReport, Any, dict[str, Any]]:
+    run = hm.simulate_network(agent_network(scenario), scenario.stop_time, progress=sys.stderr.isatty())
+    times, jumps = np.minimum(np.arange(int(np.ceil(run.t / interval)) + 1) * interval, run.t), np.unique(run.events.t)
+    if scenario.network.agents * len(jumps) > MOST_AT_EVENTS:
+        jumps = jumps[:0]
+    times = np.union1d(times, jumps)
+    rows, before = _both_sides(times, np.isin(times, jumps))
+    signals = {}
+    for name, arc in run.arcs.items() if wanted else ():
+        # The others end at their last event where one agent ends the run.
+        reached = np.minimum(rows, arc.t[-1])
+        for item in ("x", "broadcast"):
+            values = np.where(before, arc.at(item, reached, before=True), arc.at(item, reached))
+            signals[f"{name}.{item}"] = values.tolist()
+    return report_of_network(scenario, run), rows.tolist(), signals
 
 
 def _text(scenario: Scenario, report: RunReport) -> str:

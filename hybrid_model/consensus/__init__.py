@@ -38,6 +38,7 @@ if TYPE_CHECKING:
         star_graph,
     )
     from hybrid_model.consensus.graphs.spanning_trees import TreePartition, all_spanning_trees, spanning_tree_count
+    from hybrid_model.consensus.laws.agent_network import agent_network
     from hybrid_model.consensus.laws.agents import Integrator, agent
     from hybrid_model.consensus.laws.closed_loop import broadcast_wires, closed_loop, scenario_agents
     from hybrid_model.consensus.laws.double_integrators import (
@@ -131,6 +132,7 @@ __all__ = [
     "WindowExtremes",
     "agent",
     "agent_graph",
+    "agent_network",
     "all_spanning_trees",
     "best_window",
     "broadcast_wires",

@@ -130,7 +130,7 @@ class Network:
         for place in layout.places[kind]:
             if place.variable.name in self._values:
                 rows[:, place.at] = self._column(place, members)
-            elif place.variable.name in self._link_values:
+            elif place.variable.name in self._link_values and place.variable.size:
                 rows[:, place.at] = self._link_values[place.variable.name][self._links_into(members)]
         return rows
 
@@ -142,7 +142,7 @@ class Network:
             for place in layout_of(template).places[kind]:
                 if place.variable.name in self._values:
                     starts[place.variable.name] = self._column(place, member).reshape(place.variable.shape)
-                elif place.variable.name in self._link_values:
+                elif place.variable.name in self._link_values and place.variable.size:
                     column = self._link_values[place.variable.name]
                     starts[place.variable.name] = column[self._links_into(member)].reshape(place.variable.shape)
         return Copy(template, self.parts[part], starts)
@@ -195,8 +195,11 @@ class Network:
             raise DeclarationError(
                 f"{self.name}: {name} is given with shape {value.shape}: give one value for each of {links} links."
             )
-        for template, members in zip(self._having(name), self.members, strict=True):
-            shape, degrees = _variable(template, name).shape, np.unique(self.links.degrees[members])
+        for template, members in zip(self.templates, self.members, strict=True):
+            degrees = np.unique(self.links.degrees[members])
+            if not degrees.any():
+                continue
+            shape = _variable(template, name).shape
             if any(shape != (degree,) for degree in degrees):
                 raise DeclarationError(
                     f"{self.name}: {name} has shape {shape}, but there are parts that hear {int(degrees[-1])} others: "

@@ -56,7 +56,7 @@ def scenario_agents(scenario: Scenario, motion: type[hm.HybridAutomaton] | None 
         raise ScenarioError(f"motion is {motion!r}; give a class derived from hybrid_model.consensus.Integrator.")
     if motion is not None and scenario.trigger.kind is TriggerKind.CONTINUOUS:
         raise ScenarioError("motion is given, but the trigger 'continuous' has a motion of its own; leave one out.")
-    return {agent_name(i): _agent(scenario, i, motion) for i in range(1, scenario.network.agents + 1)}
+    return {agent_name(i): scenario_agent(scenario, i, motion) for i in range(1, scenario.network.agents + 1)}
 
 
 def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
@@ -150,7 +150,8 @@ def agent_recipes(scenario: Scenario, number: int, motion: type[hm.HybridAutomat
     }
 
 
-def _agent(scenario: Scenario, number: int, motion: type[hm.HybridAutomaton] | None) -> hm.Composition:
+def scenario_agent(scenario: Scenario, number: int, motion: type[hm.HybridAutomaton] | None = None) -> hm.Composition:
+    """Make agent `number`, counted from 1; see `scenario_agents`."""
     recipes = agent_recipes(scenario, number, motion)
     return agent(agent_name(number), **{part: make() for part, (_, make) in recipes.items()})
 

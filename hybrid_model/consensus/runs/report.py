@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid_model import HybridArc
-from hybrid_model.consensus.graphs.undirected import incidence
+from hybrid_model import HybridArc, NetworkRun
 from hybrid_model.consensus.laws.closed_loop import agent_name
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.declare.variables import FloatArray
@@ -90,6 +89,30 @@ def run_report(scenario: Scenario, arc: HybridArc) -> RunReport:
     )
 
 
+def report_of_network(scenario: Scenario, run: NetworkRun) -> RunReport:
+    """Take the figures of a run of a scenario's agents, part by part; the mean is that of the end.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What ran.
+    run : NetworkRun
+        Of `agent_network(scenario)`.
+    """
+    x_end, sent = run.final("x"), run.events.named("trigger.broadcast")
+    part, times = run.events.part[sent], run.events.t[sent]
+    order = np.argsort(part, kind="stable")
+    ends = np.searchsorted(part[order], np.arange(1, scenario.network.agents))
+    return RunReport(
+        event_times=np.split(times[order], ends),
+        x_end=x_end,
+        edge_norm_end=edge_norm(scenario, x_end),
+        mean_drift=float(abs(np.mean(x_end) - np.mean(scenario.network.initial))),
+        stop=run.stop.name,
+        message=run.message,
+    )
+
+
 def broadcast_times(arc: HybridArc, name: str) -> FloatArray:
     """Return the times in s of an agent's broadcasts; none for an agent that broadcasts continuously."""
     jump = f"{name}.trigger.broadcast"
@@ -111,7 +134,6 @@ def edge_norm(scenario: Scenario, x: FloatArray) -> Any:
     -------
     float or ndarray, shape (times,)
     """
-    network = scenario.network
-    matrix = incidence(network.agents, network.underlying_edges)
-    norms = np.linalg.norm(matrix.T @ x, axis=0)
+    tails, heads = (np.array(scenario.network.underlying_edges) - 1).T
+    norms = np.linalg.norm(x[heads] - x[tails], axis=0)
     return float(norms) if np.ndim(x) == 1 else norms

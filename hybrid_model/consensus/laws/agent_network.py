@@ -1,0 +1,83 @@
+"""The agents of a scenario as a network that runs part by part: as arrays where they are copies of few agents."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import hybrid_model as hm
+from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agent
+from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import TriggerKind
+from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
+from hybrid_model.declare.variables import FloatArray
+
+_SEE_ALIKE = (
+    *(TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.MIXED, TriggerKind.RELATIVE, TriggerKind.GIRARD),
+    *(TriggerKind.SAMPLED, TriggerKind.PERIODIC),
+)
+"""Laws that know the number of an agent's edges, and nothing else of them."""
+
+
+def agent_network(scenario: Scenario) -> hm.Network | hm.Composition:
+    """Return what `hm.simulate_network` runs for a scenario.
+
+    Agents with equally many neighbours are copies where they differ in start values and in numbers of their weights
+    alone: then no object is made for any of them. With switching or a channel, with weights from tables or functions,
+    and with laws that know their edges, the network is composed of its agents one by one.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Network, weights, switching and trigger.
+
+    Raises
+    ------
+    ScenarioError
+        As `closed_loop`, and for agents that see each other's states all the time: these do not meet at events alone.
+    """
+    if scenario.trigger.kind is TriggerKind.CONTINUOUS:
+        raise ScenarioError(
+            "[trigger] kind is 'continuous', so agents see each other's states all the time and cannot run apart: run "
+            "the closed loop as one automaton."
+        )
+    if not _are_copies(scenario):
+        return closed_loop(scenario)
+    edges = np.array(scenario.network.edges, dtype=np.int64).reshape(-1, 2) - 1
+    degrees = np.bincount(edges.ravel(), minlength=scenario.network.agents)
+
+    def agent(degree: int) -> hm.Automaton:
+        return scenario_agent(scenario, int(np.argmax(degrees == degree)) + 1)
+
+    return hm.Network(
+        scenario.name,
+        agent,
+        (edges.ravel(), edges[:, ::-1].ravel()),
+        {"neighbours": "broadcast"},
+        values={"x": np.array(scenario.network.initial)},
+        link_values={f"weights.{name}": np.repeat(column, 2) for name, column in _numbers(scenario).items()},
+        label="agent",
+        count=scenario.network.agents,
+    )
+
+
+def _are_copies(scenario: Scenario) -> bool:
+    return (
+        scenario.trigger.kind in _SEE_ALIKE
+        and isinstance(scenario.switching, NoSwitching)
+        and scenario.channel.ideal
+        and len({wave.automaton for wave in scenario.weights.waveforms}) == 1
+        and _is_by_number(scenario.weights.waveforms[0].automaton)
+    )
+
+
+def _is_by_number(automaton: type[hm.Automaton]) -> bool:
+    """Whether each parameter of the automaton of an agent's weights has one number for each edge."""
+    return issubclass(automaton, EdgeAutomaton) and automaton.of.__func__ is EdgeAutomaton.of.__func__  # type: ignore[attr-defined]
+
+
+def _numbers(scenario: Scenario) -> dict[str, FloatArray]:
+    """Return the numbers of the weights, one for each edge."""
+    waveforms = scenario.weights.waveforms
+    return dict(waveforms[0].automaton.columns(waveforms))

@@ -1,0 +1,86 @@
+"""Agents as a network of arrays: the same events as the agents composed one by one."""
+
+import numpy as np
+import pytest
+
+import hybrid_model as hm
+from hybrid_model import consensus
+from hybrid_model.consensus.laws.agent_network import agent_network
+from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.runs.report import report_of_network, run_report
+from hybrid_model.consensus.scenario.files import read_scenario
+
+WEIGHTS = {
+    "constant": {"value": [0.3, 0.9, 0.6, 1.1]},
+    "gated-sine": {
+        "gate_rate": 4.0,
+        "sine_rate": 5.0,
+        "duty_percent": [30.0, 40.0, 50.0, 60.0],
+        "phase": [0.0, 0.4, 0.8, 1.2],
+    },
+    "sine": {"mean": 0.6, "depth": [0.1, 0.2, 0.3, 0.4], "rate": 3.0},
+}
+TRIGGERS = {"dynamic": {"threshold": 0.1, "decay": 0.2}, "relative": {"sigma": 0.4, "floor": 1e-3}}
+
+
+def scenario_with(weights="constant", trigger="dynamic", **others):
+    """Five agents, one of them with three neighbours, one with none."""
+    return read_scenario(
+        {
+            "name": "five",
+            "stop_time": 3.0,
+            "network": {"agents": 5, "edges": [[1, 2], [4, 2], [2, 3], [3, 4]], "initial": [1.0, -0.5, 0.7, -1.0, 0.2]},
+            "weights": {"kind": weights, **WEIGHTS[weights]},
+            "trigger": {"kind": trigger, **TRIGGERS[trigger]},
+            **others,
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("weights", "trigger"), [("constant", "relative"), ("gated-sine", "dynamic"), ("sine", "dynamic")]
+)
+def test_copies_of_few_agents_run_as_the_closed_loop_does(weights, trigger):
+    scenario = scenario_with(weights, trigger)
+    network = agent_network(scenario)
+    assert isinstance(network, hm.Network)
+    assert len(network.templates) == 4
+    run = hm.simulate_network(network, scenario.stop_time, engine="native")
+    found = report_of_network(scenario, run)
+    wanted = run_report(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time))
+    assert found.events_per_agent == wanted.events_per_agent
+    assert sum(found.events_per_agent) > 10
+    for times, others in zip(found.event_times, wanted.event_times, strict=True):
+        np.testing.assert_allclose(times, others, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found.x_end, wanted.x_end, rtol=0.0, atol=1e-9)
+    assert found.edge_norm_end == pytest.approx(wanted.edge_norm_end, abs=1e-9)
+    assert found.mean_drift < 1e-12
+
+
+@pytest.mark.parametrize(
+    "others",
+    [
+        {"switching": {"dwell": 1.0, "active": [[1, 2], [3, 4]]}},
+        {"channel": {"delay": 0.1, "slots": 20}},
+    ],
+)
+def test_agents_that_differ_in_more_are_composed_one_by_one(others):
+    assert isinstance(agent_network(scenario_with(**others)), hm.Composition)
+
+
+def test_agents_that_see_each_other_all_the_time_are_refused():
+    scenario = consensus.replace_trigger(scenario_with(), "static")
+    continuous = {"kind": "continuous"}
+    entries = {**_entries(), "trigger": continuous}
+    assert isinstance(agent_network(scenario), hm.Network)
+    with pytest.raises(consensus.ScenarioError, match="see each other's states all the time"):
+        agent_network(read_scenario(entries))
+
+
+def _entries():
+    return {
+        "name": "two",
+        "stop_time": 1.0,
+        "network": {"agents": 2, "edges": [[1, 2]], "initial": [1.0, -1.0]},
+        "weights": {"kind": "constant", "value": 1.0},
+    }
