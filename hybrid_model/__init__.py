@@ -6,7 +6,7 @@ from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.dwell import MinimumDwell
 from hybrid_model.declare.hybrid_automaton import HybridAutomaton
-from hybrid_model.declare.margins import greatest, least
+from hybrid_model.declare.margins import greatest, least, lookup
 from hybrid_model.declare.modes import ModalAutomaton, Mode, Switch, TimedSwitch
 from hybrid_model.declare.signals import Signal
 from hybrid_model.declare.transitions import Clock, Jump, Priority, TimeEvent
@@ -89,6 +89,7 @@ __all__ = [
     "least",
     "load_arc",
     "load_network_events",
+    "lookup",
     "product",
     "series",
     "simulate",

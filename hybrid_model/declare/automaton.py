@@ -9,6 +9,9 @@ from hybrid_model.declare.transitions import Assignments, ClockInfo, JumpInfo, P
 from hybrid_model.declare.variables import Kind, Value, Values, Variable
 from hybrid_model.errors import DeclarationError
 
+_SHOWN = 4
+"""As many names of a kind as a person reads."""
+
 
 class Automaton(ABC):
     """What every execution of an automaton uses; `HybridAutomaton` and `Composition` implement it.
@@ -79,6 +82,19 @@ class Automaton(ABC):
     def of_kind(self, *kinds: Kind) -> list[Variable]:
         """Return the variables of the given kinds, in declaration order."""
         return [v for v in self.variables if v.kind in kinds]
+
+    def __repr__(self) -> str:
+        if not hasattr(self, "variables"):
+            return object.__repr__(self)
+        named = {kind.value: [variable.name for variable in self.of_kind(kind)] for kind in Kind}
+        named["jumps"] = [jump.name for jump in self.jumps]
+        listed = [f"{what} {_some(names)}" for what, names in named.items() if names]
+        return f"{type(self).__name__}({self.name}: {'; '.join(listed)})"
+
+
+def _some(names: list[str]) -> str:
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return ", ".join(names[:_SHOWN]) + more
 
 
 def require_automaton(given: object) -> None:

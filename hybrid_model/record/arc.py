@@ -103,7 +103,7 @@ class HybridArc:
         raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
 
     def __getitem__(self, name: str) -> FloatArray:
-        """Return a variable's samples, shape (n, *shape): a state, input, parameter or output."""
+        """Return a variable's samples, shape (n, *shape): a state, input, parameter or output, or ``v[1]`` of them."""
         return self._read.column(name, self.t, sampled_states(self._flows), held_in(self._flows, self._numbers))
 
     def variable(self, name: str) -> Variable:
@@ -122,7 +122,7 @@ class HybridArc:
         Parameters
         ----------
         name : str
-            A variable of the automaton.
+            A variable of the automaton, or an element of one, counted from 1 as in FMUs and plots: ``v[1]``.
         t : float or array_like
             Times in s within the run.
         before : bool

@@ -11,13 +11,14 @@ import bisect
 import functools
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.layout import Place, layout_of
 from hybrid_model.declare.signals import Inputs
-from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, unknown_name
+from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, element_names, unknown_name
 from hybrid_model.errors import DeclarationError
 
 
@@ -59,23 +60,37 @@ class ArcValues(ABC):
         """Return the output vector at a point of a flow."""
 
     def variable(self, name: str) -> Variable:
-        """Return a variable by name.
+        """Return a variable, or an element of one such as ``v[1]``, by name.
 
         Raises
         ------
         DeclarationError
             If there is none.
         """
-        if name not in self._places:
-            known = {variable.name: variable for variable in self.automaton.variables}
-            whole = name.partition("[")[0] if isinstance(name, str) else name
-            if whole in self._places and whole != name:
-                raise DeclarationError(
-                    f"{name} is an element of {whole}: write arc[{whole!r}][:, i], counted from 0; names of elements "
-                    "are for plots and tables."
-                )
-            raise DeclarationError(unknown_name(self.automaton.name, name, known))
-        return self._places[name].variable
+        return self._place(name).variable
+
+    def _place(self, name: str) -> Place:
+        place = self._places.get(name) or self._elements.get(name)
+        if place is not None:
+            return place
+        known = {variable.name: variable for variable in self.automaton.variables}
+        whole = name.partition("[")[0] if isinstance(name, str) else name
+        if whole in self._places and whole != name:
+            elements = element_names(self._places[whole].variable)
+            what = "a scalar" if elements == [whole] else f"an array of {elements[0]} to {elements[-1]}"
+            raise DeclarationError(f"{self.automaton.name} has no {name}: {whole} is {what}.")
+        raise DeclarationError(unknown_name(self.automaton.name, name, known))
+
+    @functools.cached_property
+    def _elements(self) -> dict[str, Place]:
+        """The scalars in arrays, by the names that FMUs, tables and plots have for them."""
+        found = {}
+        for place in self._places.values():
+            if place.variable.shape:
+                names, starts = element_names(place.variable), place.variable.start.ravel()
+                for name, start, at in zip(names, starts, range(place.at.start, place.at.stop), strict=True):
+                    found[name] = Place(replace(place.variable, name=name, start=np.array(start)), slice(at, at + 1))
+        return found
 
     def interpolation_error(self, name: str) -> FloatArray:
         """Return how far a value inside a step may lie from the dense output of the run."""
@@ -96,11 +111,11 @@ class ArcValues(ABC):
             vector = self.parameters(t)
         else:
             vector = self.inputs(t, x, z) if kind is Kind.INPUT else self.outputs(t, x, z)
-        return np.asarray(self._places[name].take(vector), dtype=np.float64)
+        return np.asarray(self._place(name).take(vector), dtype=np.float64)
 
     def column(self, name: str, t: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
         """Return one variable's values at points, shape (points, *shape): t has an element for each, x and z a row."""
-        kind, place = self.variable(name).kind, self._places[name]
+        kind, place = self.variable(name).kind, self._place(name)
         if kind is Kind.STATE:
             table = self.states(x)
         elif kind is Kind.DISCRETE:
@@ -247,6 +262,4 @@ class LoadedValues(ArcValues):
             Kind.OUTPUT: self.outputs(0.0, self.errors, np.zeros(0)),
         }
         kind = self.variable(name).kind
-        return (
-            np.array(self._places[name].take(vectors[kind])) if kind in vectors else super().interpolation_error(name)
-        )
+        return np.array(self._place(name).take(vectors[kind])) if kind in vectors else super().interpolation_error(name)

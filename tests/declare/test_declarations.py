@@ -467,3 +467,14 @@ def test_ranges_and_sizes_reach_the_importer(fmi, tmp_path):
     getter(fmu.component, nominals, 3)
     assert list(nominals) == [10.0, 10.0, 1.0]
     fmu.freeInstance()
+
+
+def test_an_automaton_shows_what_it_consists_of():
+    assert repr(BouncingBall()) == "BouncingBall(BouncingBall: continuous states h, v; parameters g, e; jumps jump)"
+
+
+def test_an_automaton_of_many_parts_shows_the_first():
+    class Many(hm.HybridAutomaton):
+        a, b, c, d, e, f = (hm.Parameter(0.0) for _ in range(6))
+
+    assert repr(Many("m")) == "Many(m: parameters a, b, c, d and 2 more)"

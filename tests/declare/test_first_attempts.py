@@ -448,7 +448,7 @@ def test_constructors_and_functions_given_something_else(make, sentence):
     ("use", "sentence"),
     [
         (lambda arc: arc.h, r"^a run has no attribute 'h': write arc\['h'\] for the samples of h\.$"),
-        (lambda arc: arc["h[1]"], r"^h\[1\] is an element of h: write arc\['h'\]\[:, i\], counted from 0"),
+        (lambda arc: arc["h[1]"], r"^BouncingBall has no h\[1\]: h is a scalar\.$"),
         (lambda arc: arc.at("h", "soon"), r"^the times are 'soon': give numbers in s\.$"),
         (lambda arc: arc.resample(None), r"^the times are None: give numbers in s\.$"),
         (lambda arc: arc.restrict(t=1.0), r"^the interval t = 1\.0 has no two ends: write t=\(first, last\)\.$"),

@@ -115,6 +115,24 @@ def test_shapes_of_what_is_asked_for_are_kept():
     assert arc.at("w", np.zeros((2, 3))).shape == (2, 3, 2)
 
 
+def test_elements_have_the_names_that_fmus_and_plots_give_them():
+    class Decay(hm.HybridAutomaton):
+        v = hm.State([1.0, 2.0])
+        A = hm.Parameter([[1.0, 2.0], [3.0, 4.0]])
+
+        def flow_map(self, s):
+            return {"v": -s.v}
+
+    arc = hm.simulate(Decay(), 1.0)
+    np.testing.assert_array_equal(arc["v[2]"], arc["v"][:, 1])
+    np.testing.assert_array_equal(arc.at("v[1]", [0.0, 0.5]), arc.at("v", [0.0, 0.5])[:, 0])
+    assert arc.at("A[2,1]", 0.3) == 3.0
+    assert arc.variable("v[2]").shape == ()
+    assert list(arc.resample([0.0, 1.0], ["v[2]"]).values) == ["v[2]"]
+    with pytest.raises(hm.DeclarationError, match=r"^Decay has no v\[3\]: v is an array of v\[1\] to v\[2\]\.$"):
+        arc["v[3]"]
+
+
 def test_the_end_has_all_values(ball):
     assert ball.end.t == 2.0
     assert ball.end.h == ball["h"][-1]
