@@ -44,9 +44,12 @@ class FmuSlave(Slave):
         `start`, if it has no binary for this machine.
     """
 
+    kind = "CoSimulation"
+    """The interface of the FMU that is used."""
+
     def __init__(self, name: str, path: str | Path, *, validate: bool = True) -> None:
-        self._file = FmuFile(name, path, validate=validate)
-        description, interface = self._file.description, self._file.description.coSimulation
+        self._file = FmuFile(name, path, validate=validate, kind=self.kind)
+        description, interface = self._file.description, self._file.interface
         self._variables = FmuVariables(description)
         self._clock_references = {
             variable.name: variable.valueReference
@@ -57,7 +60,7 @@ class FmuSlave(Slave):
         super().__init__(name, inputs, outputs, list(self._clock_references), self._variables.tunable)
         self.has_event_mode = bool(getattr(interface, "hasEventMode", False))
         self.can_restore = bool(interface.canGetAndSetFMUstate)
-        self.variable_step = bool(interface.canHandleVariableCommunicationStepSize)
+        self.variable_step = bool(getattr(interface, "canHandleVariableCommunicationStepSize", True))
         self.foresees = self._file.foresees
         self.default_start_time, self.default_stop_time = self._file.start_time, self._file.stop_time
         self.default_step, self.internal_step = self._file.step, self._file.internal_step

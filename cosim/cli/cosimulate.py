@@ -6,7 +6,7 @@ import argparse
 import math
 import shutil
 import sys
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 from cosim.cli import run_files
@@ -24,6 +24,7 @@ from cosim.system import System
 from cosim.systems.assembly import assemble
 from cosim.systems.definition import Experiment
 from cosim.systems.files import read_system
+from cosim.systems.toml_file import INTERFACES
 from cosim.tables.input_table import read_inputs
 from fmu.export import export_fmu
 from fmu.importer.temporary_folders import temporary_folder
@@ -50,6 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--master",
         choices=MASTERS,
         help="default: event-exact; error-controlled where signals change along flows; else fixed-step",
+    )
+    parser.add_argument(
+        "--interface", choices=INTERFACES, help="of FMUs that have both; default: cs, Co-Simulation; me: Model Exchange"
     )
     parser.add_argument("--tolerance", type=float, help="of the error-controlled master: of each step; default: 1e-9")
     parser.add_argument(
@@ -94,6 +98,11 @@ def run(options: argparse.Namespace) -> int:
             scenario = load_scenario(options.system)
             system, experiment = _agents(scenario, folder), Experiment(stop_time=scenario.stop_time)
         else:
+            if options.interface is not None:
+                definition = replace(
+                    definition,
+                    components=[replace(c, interface=c.interface or options.interface) for c in definition.components],
+                )
             system, experiment = assemble(definition, validate=not options.no_validate), definition.experiment
             options.input_file = options.input_file or definition.inputs
         _set_starts(system.slaves, starts)

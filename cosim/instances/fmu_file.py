@@ -33,6 +33,8 @@ class FmuFile:
     path : str or Path
     validate : bool
         Whether to hold the description against the schema and fmpy's checks.
+    kind : {"CoSimulation", "ModelExchange"}
+        The interface that is used.
 
     Attributes
     ----------
@@ -48,7 +50,7 @@ class FmuFile:
         If the file is no such FMU, or its archive must not be extracted.
     """
 
-    def __init__(self, name: str, path: str | Path, *, validate: bool) -> None:
+    def __init__(self, name: str, path: str | Path, *, validate: bool, kind: str = "CoSimulation") -> None:
         try:
             self.description = read_description(path, validate=validate)
         except ValidationError as error:
@@ -58,9 +60,11 @@ class FmuFile:
             ) from error
         except Exception as error:
             raise CosimError(f"{name}: {path} cannot be read as an FMU: {error}") from error
-        if major_of(self.description) is None or self.description.coSimulation is None:
+        self.kind, self.interface = kind, getattr(self.description, kind[0].lower() + kind[1:])
+        if major_of(self.description) is None or self.interface is None:
+            wanted = kind.replace("CoS", "Co-S").replace("lE", "l E")
             raise CosimError(
-                f"{name}: {path} is not an FMI 2.0 or 3.0 Co-Simulation FMU (it says FMI "
+                f"{name}: {path} is not an FMI 2.0 or 3.0 {wanted} FMU (it says FMI "
                 f"{self.description.fmiVersion}, {_interfaces(self.description)}): export it as one."
             )
         self._name, self._path = name, path
@@ -69,7 +73,7 @@ class FmuFile:
         self.start_time, self.stop_time, self.step = (
             _seconds(getattr(experiment, attribute, None)) for attribute in ("startTime", "stopTime", "stepSize")
         )
-        self.internal_step = _seconds(getattr(self.description.coSimulation, "fixedInternalStepSize", None))
+        self.internal_step = _seconds(getattr(self.interface, "fixedInternalStepSize", None))
         if self.step is None:
             self.step = self.internal_step
 
@@ -89,7 +93,7 @@ class FmuFile:
         CosimError
             If there is one already in this process, and the FMU allows no other.
         """
-        if not self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
+        if not self.interface.canBeInstantiatedOnlyOncePerProcess:
             return
         other = _alone.setdefault(self.description.guid, self._name)
         if other != self._name:
@@ -121,7 +125,7 @@ class FmuFile:
             try:
                 with Archive(self._path) as archive:
                     unpack(archive, folder)
-                self._loaded = FmuInstance(self.description, folder, self._name, hear)
+                self._loaded = FmuInstance(self.description, folder, self._name, hear, self.kind)
             except Exception as error:
                 shutil.rmtree(folder, ignore_errors=True)
                 raise CosimError(f"{self._name}: {self._path} cannot be loaded on this machine: {error}") from error

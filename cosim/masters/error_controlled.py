@@ -18,12 +18,14 @@ from cosim.result import CosimResult, Watch
 from cosim.system import System
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.schedule.blocks import Termination
-from hybrid_model.schedule.scheduler import ITERATIONS, Event
+from hybrid_model.schedule.scheduler import Event
 
 TOLERANCE = 1e-9
 """Error of a macro step, as a part of the largest value that each signal has had."""
 RESOLUTION = 1e-12
 """Of times of events, as a part of the run."""
+AT_ONE_TIME = 100
+"""Instants with events in a row, without a step between them, at most."""
 FIRST = 1e-3
 """First macro step, as a part of the run."""
 SAFETY, LEAST, MOST, ORDER = 0.9, 0.2, 5.0, 3
@@ -265,7 +267,7 @@ class _Run:
         """Handle the events at `t` in s."""
         result, system = self._result, self._system
         self._at_one_time += 1
-        if self._at_one_time > ITERATIONS:
+        if self._at_one_time > AT_ONE_TIME:
             raise CosimError(f"{' and '.join(sorted(due))} gets no further than t = {t:.12g} s.")
         result.t = t
         self._row(t)

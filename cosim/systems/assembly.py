@@ -7,11 +7,13 @@ from typing import Any
 
 from cosim.automaton_slave import AutomatonSlave
 from cosim.errors import MisfitError
+from cosim.exchange_slave import ExchangeSlave
 from cosim.fmu_slave import FmuSlave
 from cosim.slave import Slave
 from cosim.system import System
 from cosim.systems.automaton_files import find_automaton
 from cosim.systems.definition import FMU, Component, SystemDefinition
+from fmu.importer.loading import read_description
 from hybrid_model.named_objects import imports_from
 
 
@@ -58,9 +60,21 @@ def set_start(slave: Slave, name: str, value: Any) -> None:
         set_start(slave, element, part)
 
 
+def _exchanges(component: Component) -> bool:
+    """Return whether an FMU is used by Model Exchange: as is wished, else where it has no Co-Simulation."""
+    if component.interface is not None:
+        return component.interface == "me"
+    try:
+        description = read_description(component.source, validate=False)
+    except Exception:  # noqa: BLE001 - whatever fmpy raises, the slave says what is wrong
+        return False
+    return description.coSimulation is None and description.modelExchange is not None
+
+
 def _slave(component: Component, validate: bool) -> Slave:
     if component.kind == FMU:
-        return FmuSlave(component.name, component.source, validate=validate)
+        kind = ExchangeSlave if _exchanges(component) else FmuSlave
+        return kind(component.name, component.source, validate=validate)
     with imports_from(component.source):
         automaton = find_automaton(component.source, component.arguments)
     return AutomatonSlave(component.name, automaton)
