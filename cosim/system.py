@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -168,9 +169,10 @@ class System:
         }
 
     def close(self) -> None:
-        """Free everything the slaves hold."""
-        for slave in self.slaves.values():
-            slave.close()
+        """Free everything the slaves hold, of each whatever happens to the others."""
+        with contextlib.ExitStack() as stack:
+            for slave in self.slaves.values():
+                stack.callback(slave.close)
 
     def output(self, name: str) -> tuple[Slave, str]:
         """Return the slave and its own name of the output ``slave.output``.

@@ -14,6 +14,7 @@ from cosim.cli.exits import exit_of, given_values, progress
 from cosim.cli.run_files import RunFiles
 from cosim.consensus import fmu_system
 from cosim.errors import CosimError, UsageError
+from cosim.isolation.isolated_slave import PATIENCE
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
 from cosim.masters.error_controlled import TOLERANCE
@@ -22,7 +23,7 @@ from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
 from cosim.systems.assembly import assemble
-from cosim.systems.definition import Experiment
+from cosim.systems.definition import Experiment, SystemDefinition
 from cosim.systems.files import read_system
 from cosim.systems.toml_file import INTERFACES
 from cosim.tables.input_table import read_inputs
@@ -85,6 +86,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-validate", action="store_true", help="run an .fmu even if its description does not fit the schema"
     )
+    parser.add_argument("--isolate", action="store_true", help="run each FMU in a process of its own")
+    parser.add_argument(
+        "--call-timeout", type=float, default=PATIENCE, metavar="S", help="s that one call of an isolated FMU may take"
+    )
     parser.set_defaults(run=run)
 
 
@@ -103,12 +108,18 @@ def run(options: argparse.Namespace) -> int:
                     definition,
                     components=[replace(c, interface=c.interface or options.interface) for c in definition.components],
                 )
-            system, experiment = assemble(definition, validate=not options.no_validate), definition.experiment
+            system, experiment = _assembled(definition, options), definition.experiment
             options.input_file = options.input_file or definition.inputs
         _set_starts(system.slaves, starts)
         return _run(system, options, _completed(options, system, experiment))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _assembled(definition: SystemDefinition, options: argparse.Namespace) -> System:
+    return assemble(
+        definition, validate=not options.no_validate, isolate=options.isolate, patience=options.call_timeout
+    )
 
 
 def _completed(options: argparse.Namespace, system: System, file: Experiment) -> Experiment:

@@ -9,6 +9,7 @@ from cosim.automaton_slave import AutomatonSlave
 from cosim.errors import MisfitError
 from cosim.exchange_slave import ExchangeSlave
 from cosim.fmu_slave import FmuSlave
+from cosim.isolation.isolated_slave import PATIENCE, IsolatedSlave
 from cosim.slave import Slave
 from cosim.system import System
 from cosim.systems.automaton_files import find_automaton
@@ -17,7 +18,9 @@ from fmu.importer.loading import read_description
 from hybrid_model.named_objects import imports_from
 
 
-def assemble(definition: SystemDefinition, *, validate: bool = True) -> System:
+def assemble(
+    definition: SystemDefinition, *, validate: bool = True, isolate: bool = False, patience: float = PATIENCE
+) -> System:
     """Make a system: its slaves with their start values, and its connections.
 
     Parameters
@@ -25,6 +28,10 @@ def assemble(definition: SystemDefinition, *, validate: bool = True) -> System:
     definition : SystemDefinition
     validate : bool
         Whether to hold descriptions of FMUs against the schema.
+    isolate : bool
+        Whether to run each FMU in a process of its own.
+    patience : float
+        Seconds that one call of an isolated FMU may take.
 
     Raises
     ------
@@ -33,7 +40,7 @@ def assemble(definition: SystemDefinition, *, validate: bool = True) -> System:
     UsageError, ExportError
         If an automaton cannot be found or made.
     """
-    slaves = [_slave(component, validate) for component in definition.components]
+    slaves = [_slave(component, validate, patience if isolate else None) for component in definition.components]
     for component, slave in zip(definition.components, slaves, strict=True):
         for name, value in component.start.items():
             set_start(slave, name, value)
@@ -71,9 +78,11 @@ def _exchanges(component: Component) -> bool:
     return description.coSimulation is None and description.modelExchange is not None
 
 
-def _slave(component: Component, validate: bool) -> Slave:
+def _slave(component: Component, validate: bool, patience: float | None) -> Slave:
     if component.kind == FMU:
         kind = ExchangeSlave if _exchanges(component) else FmuSlave
+        if patience is not None:
+            return IsolatedSlave(component.name, component.source, validate=validate, kind=kind.kind, patience=patience)
         return kind(component.name, component.source, validate=validate)
     with imports_from(component.source):
         automaton = find_automaton(component.source, component.arguments)

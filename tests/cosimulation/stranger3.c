@@ -6,10 +6,11 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "fmi3Functions.h"
 
-enum { WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS };
+enum { WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS, HANGS, ABORTS, ITERATES };
 enum { X = 1, COUNT, RATE, ENDS, BEHAVIOUR, ANNOUNCES, SIZE, WEIGHTS, TOTAL, STEPS, SENT, HEARD, GAIN, GAINED,
        FIRST_ECHO = 20, ECHOES = 40 };
 enum { MOST = 100 };
@@ -101,7 +102,8 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance i, fmi3Boolean *again, fmi3Bool
     Block *b = i;
     if (b->next >= due(b) - 1e-9)
         jump(b);
-    *again = *nominals = *values = 0;
+    *nominals = *values = 0;
+    *again = b->behaviour == ITERATES;
     *terminate = b->count >= b->ends;
     *defined = b->announces;
     *time = due(b);
@@ -126,6 +128,10 @@ fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 point, fmi3Float64 size, fmi3B
         return refuse(b, "this step ends behind the stop time %.17g", b->stop);
     if (b->behaviour == DIES)
         _Exit(7);
+    if (b->behaviour == ABORTS && point > 0.45)
+        abort();
+    while (b->behaviour == HANGS)
+        sleep(1);
     if (b->behaviour == FAILS)
         return refuse(b, "no solution at %.17g", point);
     double target = point + size;

@@ -4,7 +4,7 @@ import zipfile
 
 import fmpy
 
-WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS = range(7)
+WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS, HANGS, ABORTS, ITERATES = range(10)
 """Behaviours of `stranger3.c`."""
 TYPES = {
     "Float64": 'min="-0.1" max="1e6"',
