@@ -11,8 +11,10 @@ from typing import Any
 from hybrid_model.consensus.entries import Entries, suggestion
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.channel import IDEAL, Channel
-from hybrid_model.consensus.scenario.definition import Network, Scenario, Underlying, Weights, replace_trigger
+from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights, replace_trigger
 from hybrid_model.consensus.scenario.own_trigger import read_own_trigger
+from hybrid_model.consensus.scenario.read_network import KEYS as NETWORK_KEYS
+from hybrid_model.consensus.scenario.read_network import read_network
 from hybrid_model.consensus.scenario.read_switching import read_switching
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind, trigger_keys
 from hybrid_model.consensus.switching.base import NoSwitching, Switching
@@ -122,7 +124,7 @@ def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = "
     top = Entries(
         "the scenario", entries, ("name", "stop_time", "network", "weights", "switching", "trigger", "channel")
     )
-    network = _read_network(_subtable(top, "network", ("agents", "edges", "initial", "gain", "underlying")))
+    network = read_network(_subtable(top, "network", NETWORK_KEYS))
     edge_count = len(network.edges)
     scenario = Scenario(
         name=top.text("name"),
@@ -187,20 +189,6 @@ def _subtable(top: Entries, name: str, known: tuple[str, ...] | None) -> Entries
     if not isinstance(entries, dict):
         raise top.error(name, entries, f"must be a table, written [{name}]")
     return Entries(f"[{name}]", entries, tuple(entries) if known is None else known)
-
-
-def _read_network(table: Entries) -> Network:
-    edges = table.whole_number_lists("edges")
-    for number, edge in enumerate(edges, start=1):
-        if len(edge) != 2:
-            raise table.error(f"edges[{number}]", list(edge), "must be a pair of agents, such as [1, 2]")
-    return Network(
-        agents=table.whole_number("agents"),
-        edges=tuple((edge[0], edge[1]) for edge in edges),
-        initial=table.numbers("initial"),
-        gain=table.number("gain", default=1.0),
-        underlying=table.choice("underlying", Underlying, default=Underlying.LISTED),
-    )
 
 
 def _read_switching(top: Entries, network: Network, stop_time: float) -> Switching:
