@@ -13,7 +13,7 @@ from cosim.instances.calls import FmuCalls
 from cosim.instances.fmu_file import FmuFile
 from cosim.instances.variables import STRUCTURAL, FmuVariables
 from cosim.slave import Slave
-from fmu.importer.instance import FmuInstance
+from fmu.importer.instance import Advance, FmuInstance
 from fmu.importer.values import UnfitError, Value, exact, parsed, require_within
 from hybrid_model.scales import ROUNDINGS
 from hybrid_model.schedule.blocks import Step, Update
@@ -66,6 +66,7 @@ class FmuSlave(Slave):
         self.default_step, self.internal_step = self._file.step, self._file.internal_step
         self._calls = FmuCalls(name)
         self._access: FmuAccess | None = None
+        self._do_step: Callable[[float, float], Advance | None] = self._first_step
         self._begun = False
         self._starts: dict[str, Any] = {}
         self._events = False
@@ -160,13 +161,15 @@ class FmuSlave(Slave):
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Slave.step`."""
-        instance = self._instance
         for _ in range(MAX_PARTS):
-            told, event, terminate, early = self._calls(instance.step, t, self._size(t_next - t))
+            told = self._calls(self._do_step, t, t_next - t if self.variable_step else self._size(t_next - t))
+            if told is None:
+                return Step(t_next, False)
             # The last successful time is where an FMU is only if it returned early (FMI 3.0.2 section 4.2).
-            reached = told if (early or terminate) and not _are_one(told, t_next) else t_next
-            if (event and self._events) or terminate or reached >= t_next:
-                return Step(reached, event, self._calls.termination() if terminate else None)
+            early = (told.early or told.terminate) and not _are_one(told.reached, t_next)
+            reached = told.reached if early else t_next
+            if (told.event and self._events) or told.terminate or reached >= t_next:
+                return Step(reached, told.event, self._calls.termination() if told.terminate else None)
             if not reached > t:
                 raise CosimError(
                     f"{self.name} returns from a step at {t:.17g} s and gets no further: {self._calls.said}"
@@ -194,7 +197,7 @@ class FmuSlave(Slave):
         if self._access is not None:
             if not self._calls.fatal:
                 self._access.instance.free()
-            self._access, self._begun = None, False
+            self._access, self._do_step, self._begun = None, self._first_step, False
             self._file.yield_claim()
 
     @property
@@ -206,6 +209,10 @@ class FmuSlave(Slave):
     @property
     def _instance(self) -> FmuInstance:
         return self._running.instance
+
+    def _first_step(self, t: float, size: float) -> Advance | None:
+        self._do_step = self._instance.stepper()
+        return self._do_step(t, size)
 
     def _variable(self, name: str) -> Any:
         try:
@@ -220,8 +227,8 @@ class FmuSlave(Slave):
         return tuple(clock for clock, ticked in zip(self.clocks, active, strict=True) if ticked)
 
     def _size(self, size: float) -> float:
-        """Return the length of a step; where it may not vary, it does not by rounding either."""
-        if self.variable_step or not math.isclose(size, self._step_size, rel_tol=1e-9):
+        """Return the length of a step that may not vary: it does not by rounding either."""
+        if not math.isclose(size, self._step_size, rel_tol=1e-9):
             self._step_size = size
         return self._step_size
 

@@ -114,14 +114,15 @@ class System:
         for k, name in enumerate(names):
             slave, port = self.output(name)
             outputs.setdefault(slave, {})[k] = port
-        readers = [(slave.reader(list(ports.values())), list(ports)) for slave, ports in outputs.items()]
+        readers = [slave.reader(list(ports.values())) for slave, ports in outputs.items()]
+        places = [k for ports in outputs.values() for k in ports]
+        order = sorted(range(len(places)), key=places.__getitem__)
 
         def read() -> list[Any]:
-            found: list[Any] = [None] * len(names)
-            for values, places in readers:
-                for k, value in zip(places, values(), strict=True):
-                    found[k] = value
-            return found
+            values: list[Any] = []
+            for read_slave in readers:
+                values += read_slave()
+            return [values[k] for k in order]
 
         return read
 

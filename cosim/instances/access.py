@@ -69,29 +69,36 @@ class FmuAccess:
             kind = self.instance.in_one_call(self._variables.places[name][0])
             if kind is not None:
                 groups.setdefault(kind, []).append(k)
-        plans = [self._group([names[k] for k in places], places) for places in groups.values()]
         apart = [k for k in range(len(names)) if not any(k in places for places in groups.values())]
+        at, plans = [0] * len(names), []
+        count = 0
+        for places in groups.values():
+            read, size, firsts = self._group([names[k] for k in places])
+            plans.append(read)
+            for k, first in zip(places, firsts, strict=True):
+                at[k] = count + first
+            count += size
+        for k in apart:
+            at[k], count = count, count + 1
 
-        def read() -> list[Any]:
-            found: list[Any] = [None] * len(names)
-            for group, places in plans:
-                values = self._calls(group)
-                for k, at in places:
-                    found[k] = values[at]
+        def read_all() -> list[Any]:
+            values: list[Any] = []
+            for group in plans:
+                values += self._calls(group)
             for k in apart:
-                found[k] = self.read(names[k])
-            return found
+                values.append(self.read(names[k]))
+            return [values[k] for k in at]
 
-        return read
+        return read_all
 
-    def _group(self, names: Sequence[str], places: Sequence[int]) -> tuple[Callable[[], Any], list[tuple[int, int]]]:
-        """Return what reads scalars of one type, and where each of `places` finds its own in what that returns."""
+    def _group(self, names: Sequence[str]) -> tuple[Callable[[], Any], int, list[int]]:
+        """Return what reads scalars of one type, how many numbers it returns, and where in them each of `names` is."""
         variables = {place[0].valueReference: place[0] for place in map(self._variables.places.__getitem__, names)}
         sizes = [self._variables.size(variable) for variable in variables.values()]
         firsts = dict(zip(variables, accumulate([0, *sizes]), strict=False))
         owners = [self._variables.places[name] for name in names]
         at = [firsts[variable.valueReference] + index for variable, index in owners]
-        return self.instance.numbers(list(variables.values()), sizes), list(zip(places, at, strict=True))
+        return self.instance.numbers(list(variables.values()), sizes), sum(sizes), at
 
     def write(self, name: str, value: Any) -> None:
         """Write a scalar; of an array the others stay as they are."""

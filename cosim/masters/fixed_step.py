@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Given
@@ -83,20 +84,17 @@ def run_fixed_step(
     result = CosimResult(t=t_start, watch=watch, treatment=treatment)
     try:
         start_slaves(system, t_start, t_stop, events=False, changes=changes)
-        recorded, exchange = system.reader(record), _Exchange(system)
-
-        def keep(t: float) -> None:
-            result.keep(t, record, recorded())
-
-        keep(t_start)
+        points = _Points(system, record)
+        result.keep(t_start, record, points.read())
         # Time by index: adding up steps would drift (rule 9).
         for k in range(1, count + 1):
             if not _step_all(system, result, t_stop if k == count else t_start + k * step, order == "gauss-seidel"):
                 sample_end(system, result, result.t, record)
                 break
+            recorded = points.read()
             if k % every == 0 or k == count:
-                keep(result.t)
-            exchange()
+                result.keep(result.t, record, recorded)
+            points.exchange()
             changes.arrive(result.t)
         result.final = outputs(system)
     finally:
@@ -118,18 +116,27 @@ def _step_all(system: System, result: CosimResult, t_next: float, hand_on: bool)
     return True
 
 
-class _Exchange:
-    """Carries the signals of a system that has been started; an input that holds its value already is left alone."""
+class _Points:
+    """The signals of a system that has been started, at the communication points."""
 
-    def __init__(self, system: System) -> None:
-        self._read = system.reader([f"{c.source}.{c.output}" for c in system.connections])
+    def __init__(self, system: System, record: Sequence[str]) -> None:
+        # One read for both: each costs a call of each FMU.
+        self._read = system.reader([*record, *(f"{c.source}.{c.output}" for c in system.connections)])
+        self._recorded = len(record)
         self._inputs = [(system.slaves[c.target], c.input) for c in system.connections]
-        self._sent: list[object] = [None] * len(self._inputs)
         self._converted = [(k, c.carried) for k, c in enumerate(system.connections) if c.converts]
+        self._values: list[Any] = []
+        self._sent: list[Any] = [None] * len(self._inputs)
 
-    def __call__(self) -> None:
-        # Read everything before writing anything: the order of slaves must not matter.
+    def read(self) -> list[Any]:
+        """Read everything before anything is written, for the order of slaves must not matter; return the recorded."""
         values = self._read()
+        self._values = values[self._recorded :]
+        return values[: self._recorded]
+
+    def exchange(self) -> None:
+        """Write what was read to the inputs; one that holds its value already is left alone."""
+        values = self._values
         for k, carried in self._converted:
             values[k] = carried(values[k])
         if values == self._sent:

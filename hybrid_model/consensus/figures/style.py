@@ -106,12 +106,24 @@ def save_figures(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> l
     folder.mkdir(parents=True, exist_ok=True)
     # The font's own time stamp is none of the reader's business; the subsetter warns about it for every figure.
     logging.getLogger("fontTools").setLevel(logging.ERROR)
-    written = []
+    written: list[Path] = []
     with plt.rc_context(JOURNAL):
         for name, draw in figures.items():
-            figure = draw()
-            for suffix, metadata in ((".png", {"Software": None}), (".pdf", {"CreationDate": None})):
-                written.append(folder / f"{name}{suffix}")
-                figure.savefig(written[-1], metadata=metadata)
-            plt.close(figure)
+            written += _save(draw(), folder / name)
+    return written
+
+
+def _save(figure: Figure, path: Path) -> list[Path]:
+    """Write a figure under a name without suffix, and close it; it is laid out once for both files."""
+    written = [path.with_name(f"{path.name}{suffix}") for suffix in (".png", ".pdf")]
+    # `savefig` draws a figure that has an engine once more, only to lay it out.
+    with plt.rc_context({"figure.constrained_layout.use": False}):
+        engine = figure.get_layout_engine()
+        if engine is not None:
+            figure.set_dpi(plt.rcParams["savefig.dpi"])
+            engine.execute(figure)
+            figure.set_layout_engine(None)
+        for file, metadata in zip(written, ({"Software": None}, {"CreationDate": None}), strict=True):
+            figure.savefig(file, metadata=metadata)
+    plt.close(figure)
     return written
