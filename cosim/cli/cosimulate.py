@@ -10,7 +10,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from cosim.cli import run_files
-from cosim.cli.exits import exit_of, given_values, progress
+from cosim.cli.exits import Exit, exit_of, given_values, progress
 from cosim.cli.run_files import RunFiles
 from cosim.consensus import fmu_system
 from cosim.errors import CosimError, UsageError
@@ -23,14 +23,16 @@ from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
 from cosim.systems.assembly import assemble
-from cosim.systems.definition import Experiment, SystemDefinition
+from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
 from cosim.systems.files import read_system
+from cosim.systems.ssp_reading import VERSIONS
+from cosim.systems.ssp_writing import write_osp, write_ssp
 from cosim.systems.toml_file import INTERFACES
 from cosim.tables.input_table import read_inputs
 from fmu.export import export_fmu
 from fmu.importer.temporary_folders import temporary_folder
 from fmu.importer.values import shown
-from hybrid_model.consensus.laws.closed_loop import scenario_agents
+from hybrid_model.consensus.laws.closed_loop import broadcast_wires, scenario_agents
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.files import load_scenario
 
@@ -46,7 +48,7 @@ EVENT_EXACT, ERROR_CONTROLLED, FIXED_STEP = MASTERS = "event-exact", "error-cont
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument(
-        "system", metavar="SYSTEM", help="an .fmu, a system's .toml, a folder with either, or a scenario"
+        "system", metavar="SYSTEM", help="an .fmu, .ssp, a system's .toml, a folder with one, or a scenario"
     )
     parser.add_argument(
         "--master",
@@ -86,6 +88,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-validate", action="store_true", help="run an .fmu even if its description does not fit the schema"
     )
+    parser.add_argument(
+        "--save-as",
+        type=Path,
+        metavar="F.ssp|DIR",
+        help="do not run: write the system as an SSP, or as a folder for libcosim (OspSystemStructure.xml)",
+    )
+    parser.add_argument("--ssp-version", choices=VERSIONS, default=VERSIONS[0])
     parser.add_argument("--isolate", action="store_true", help="run each FMU in a process of its own")
     parser.add_argument(
         "--call-timeout", type=float, default=PATIENCE, metavar="S", help="s that one call of an isolated FMU may take"
@@ -102,6 +111,8 @@ def run(options: argparse.Namespace) -> int:
         if definition is None:
             scenario = load_scenario(options.system)
             system, experiment = _agents(scenario, folder), Experiment(stop_time=scenario.stop_time)
+            fmus = [Component(name, FMU, str(folder / f"{name}.fmu")) for name in system.slaves]
+            definition = SystemDefinition(scenario.name, fmus, broadcast_wires(scenario))
         else:
             if options.interface is not None:
                 definition = replace(
@@ -110,6 +121,8 @@ def run(options: argparse.Namespace) -> int:
                 )
             system, experiment = _assembled(definition, options), definition.experiment
             options.input_file = options.input_file or definition.inputs
+        if options.save_as is not None:
+            return _save(options, definition, system, _completed(options, system, experiment))
         _set_starts(system.slaves, starts)
         return _run(system, options, _completed(options, system, experiment))
     finally:
@@ -120,6 +133,18 @@ def _assembled(definition: SystemDefinition, options: argparse.Namespace) -> Sys
     return assemble(
         definition, validate=not options.no_validate, isolate=options.isolate, patience=options.call_timeout
     )
+
+
+def _save(options: argparse.Namespace, definition: SystemDefinition, system: System, experiment: Experiment) -> int:
+    """Write a system for other tools instead of running it."""
+    if options.start_value:
+        raise UsageError("--start-value does not go with --save-as: write start values into the system's file.")
+    definition = replace(definition, experiment=experiment)
+    if options.save_as.suffix.lower() == ".ssp":
+        print(write_ssp(definition, system, options.save_as, options.ssp_version))
+    else:
+        print(write_osp(definition, system, options.save_as, experiment.step_size or STEP))
+    return int(Exit.DONE)
 
 
 def _completed(options: argparse.Namespace, system: System, file: Experiment) -> Experiment:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from cosim.errors import MisfitError
 from cosim.systems.definition import FMU, Component, SystemDefinition
+from cosim.systems.ssp_reading import DESCRIPTION, read_ssd, read_ssp
 from cosim.systems.toml_file import is_system, read_toml
 
 SUFFIX = ".fmu"
@@ -13,7 +14,7 @@ IN_FOLDER = "system.toml"
 
 
 def read_system(path: str | Path) -> SystemDefinition | None:
-    """Read a system from a TOML file, a folder with one, or an FMU, which is a system of one component.
+    """Read a system from a TOML file, an SSP file, a folder with one, or an FMU, which is a system of one component.
 
     Returns
     -------
@@ -30,6 +31,8 @@ def read_system(path: str | Path) -> SystemDefinition | None:
         return _folder(path)
     if path.suffix.lower() == SUFFIX:
         return SystemDefinition(path.stem, [Component(path.stem, FMU, str(path))])
+    if path.suffix.lower() == ".ssp":
+        return read_ssp(path)
     if path.suffix.lower() == ".toml" and is_system(path):
         return read_toml(path)
     return None
@@ -38,6 +41,8 @@ def read_system(path: str | Path) -> SystemDefinition | None:
 def _folder(path: Path) -> SystemDefinition:
     if (path / IN_FOLDER).is_file():
         return read_toml(path / IN_FOLDER)
+    if (path / DESCRIPTION).is_file():
+        return read_ssd(path / DESCRIPTION)
     fmus = sorted(file for file in path.iterdir() if file.suffix.lower() == SUFFIX)
     if not fmus:
         raise MisfitError(f"{path} has no {IN_FOLDER} and no FMU: give one of them.")

@@ -36,6 +36,8 @@ class ArchiveLimits:
     ratio_from : int
     name_length : int
         Characters of a member's name.
+    description : str
+        The member that says what the archive is, and that it must have at its top.
     """
 
     entries: int = 20_000
@@ -43,6 +45,7 @@ class ArchiveLimits:
     ratio: float = 200.0
     ratio_from: int = 16 << 20
     name_length: int = 1024
+    description: str = DESCRIPTION
 
 
 LIMITS = ArchiveLimits()
@@ -62,10 +65,11 @@ def problems_of(archive: zipfile.ZipFile, limits: ArchiveLimits) -> Iterator[tup
         yield "size", f"The archive unpacks to {total} bytes; at most {limits.total_bytes} are accepted."
     yield from _clashes(members)
     yield from _overlaps(members)
-    if DESCRIPTION not in map(name_of, members):
+    if limits.description not in map(name_of, members):
+        what = "FMU" if limits.description == DESCRIPTION else "archive of its kind"
         yield (
             "description",
-            f"The archive has no {DESCRIPTION} at its top; every FMU has one: pack the folder's content.",
+            f"The archive has no {limits.description} at its top; every {what} has one: pack the folder's content.",
         )
 
 

@@ -14,7 +14,9 @@ from fmu.errors import BuildError
 ARCHIVE_DATE = (1980, 1, 1, 0, 0, 0)
 
 
-def package(content: Path | Mapping[str, bytes | Path], fmu_path: Path) -> Path:
+def package(
+    content: Path | Mapping[str, bytes | Path], fmu_path: Path, description: str = "modelDescription.xml"
+) -> Path:
     """Write an FMU archive with fixed dates and sorted names, all at once or not at all.
 
     Parameters
@@ -23,6 +25,8 @@ def package(content: Path | Mapping[str, bytes | Path], fmu_path: Path) -> Path:
         A folder, or the members' names (with ``/``) and what they hold: bytes, or the path of a file.
     fmu_path : Path
         The archive to write.  What was there stays until the new one is complete.
+    description : str
+        The member that it must have at its top.
 
     Returns
     -------
@@ -43,9 +47,9 @@ def package(content: Path | Mapping[str, bytes | Path], fmu_path: Path) -> Path:
             "Remedy: check that the file exists and may be read."
         ) from error
     _check_names(list(members))
-    if "modelDescription.xml" not in members:
+    if description not in members:
         raise BuildError(
-            f"The FMU '{fmu_path.name}' has no modelDescription.xml; every FMU needs one at its top. "
+            f"The FMU '{fmu_path.name}' has no {description}; every FMU needs one at its top. "
             "Remedy: add the model description to the content."
         )
     with (

@@ -11,8 +11,10 @@ from typing import Any, TypeVar
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
 
 from fmu.archives.reading import Archive
+from fmu.importer.plain_xml import require_plain
 
 Fmu = TypeVar("Fmu")
+DESCRIPTION = "modelDescription.xml"
 
 
 class LoadError(ValueError):
@@ -32,10 +34,14 @@ def read_description(path: str | Path, *, validate: bool = True) -> Any:
     ------
     ArchiveError
         If the archive must not be extracted.
+    PlainXmlError
+        If its description has a DOCTYPE, or is not in UTF-8.
     Exception
         Whatever fmpy raises for a description that it cannot read.
     """
-    with Archive(path):
+    with Archive(path) as archive:
+        if DESCRIPTION in archive.names:
+            require_plain(archive.read(DESCRIPTION), DESCRIPTION)
         return read_model_description(str(path), validate=validate)
 
 

@@ -1,0 +1,160 @@
+"""Systems in SSP files: read and written, both versions; the folder for libcosim; what must not be read."""
+
+import zipfile
+from importlib import resources
+
+import pytest
+from lxml import etree
+
+from cosim.cli.main import main
+from cosim.errors import MisfitError
+from cosim.systems.assembly import assemble
+from cosim.systems.files import read_system
+from cosim.systems.ssp_reading import read_ssp
+
+SYSTEM = """
+name = "pair"
+[experiment]
+stop_time = 1.7
+[components.a]
+fmu = "stranger.fmu"
+start = { rate = 2.0, string_in = "a text", boolean_in = true, enumeration_in = "high", int64_in = 9007199254740993 }
+[components.b]
+fmu = "stranger.fmu"
+[connections]
+"b.int32_in" = "a.sent"
+"""
+SSD = """<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues"
+    xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping" version="1.0" name="by hand">
+  <ssd:System name="top">
+    <ssd:Connectors><ssd:Connector name="speed" kind="parameter"/></ssd:Connectors>
+    <ssd:ParameterBindings><ssd:ParameterBinding source="system.ssv"/></ssd:ParameterBindings>
+    <ssd:Elements>
+      <ssd:Component name="a" source="resources/stranger.fmu" {attributes}>
+        <ssd:ParameterBindings><ssd:ParameterBinding source="a.ssv">
+          <ssd:ParameterMapping source="a.ssm"/>
+        </ssd:ParameterBinding></ssd:ParameterBindings>
+      </ssd:Component>
+      {more}
+    </ssd:Elements>
+    <ssd:Connections>
+      <ssd:Connection startConnector="speed" endElement="a" endConnector="rate"/>{wires}
+    </ssd:Connections>
+  </ssd:System>
+  <ssd:DefaultExperiment startTime="0" stopTime="1"/>
+</ssd:SystemStructureDescription>
+"""
+VALUES = """<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0"
+  name="x">
+<ssv:Parameters><ssv:Parameter name="{name}"><ssv:Real value="{value}"/></ssv:Parameter></ssv:Parameters>
+</ssv:ParameterSet>"""
+MAPPING = """<ssm:ParameterMapping xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+  version="1.0">
+<ssm:MappingEntry source="weight" target="weights[1]"/></ssm:ParameterMapping>"""
+
+
+@pytest.fixture
+def by_hand(stranger, tmp_path):
+    """Write an SSP as another tool may have."""
+
+    def write(attributes="", more="", wires="", prefix="", source=True):
+        path, content = tmp_path / "hand.ssp", SSD.format(attributes=attributes, more=more, wires=wires)
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("SystemStructure.ssd", prefix + content if prefix else content)
+            archive.writestr("system.ssv", VALUES.format(name="speed", value=2.0))
+            archive.writestr("a.ssv", VALUES.format(name="weight", value=5.0))
+            archive.writestr("a.ssm", MAPPING)
+            if source:
+                archive.write(stranger(), "resources/stranger.fmu")
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+def test_a_system_comes_back_as_it_was_written(version, stranger, tmp_path, capsys):
+    stranger()
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    target = tmp_path / "out" / "pair.ssp"
+    target.parent.mkdir()
+    assert main(["cosim", str(tmp_path / "system.toml")]) == 0
+    expected = capsys.readouterr().out
+    assert main(["cosim", str(tmp_path / "system.toml"), "--save-as", str(target), "--ssp-version", version]) == 0
+    assert capsys.readouterr().out == f"{target}\n"
+    assert main(["cosim", str(target)]) == 0
+    assert capsys.readouterr().out == expected
+    assert "a.int64_out = 9007199254740993" in expected
+    assert "b.int32_out = 3" in expected
+
+
+def test_what_is_written_fits_the_schema(stranger, tmp_path):
+    stranger()
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    assert main(["cosim", str(tmp_path / "system.toml"), "--save-as", str(tmp_path / "pair.ssp")]) == 0
+    with zipfile.ZipFile(tmp_path / "pair.ssp") as archive:
+        document = etree.fromstring(archive.read("SystemStructure.ssd"))
+    schema = resources.files("fmpy") / "ssp" / "schema" / "SystemStructureDescription.xsd"
+    etree.XMLSchema(etree.parse(str(schema))).assertValid(document)
+
+
+def test_parameters_come_from_files_by_mappings_and_from_the_system(by_hand):
+    definition = read_ssp(by_hand())
+    (a,) = definition.components
+    assert a.start == {"weights[1]": "5.0", "rate": "2.0"}
+    assert definition.experiment.stop_time == 1.0
+    slave = assemble(definition).slaves["a"]
+    assert slave.inputs
+
+
+@pytest.mark.parametrize(
+    ("told", "sentence"),
+    [
+        ({"source": False}, "component a is said to be in 'resources/stranger.fmu', which is no file in it"),
+        ({"attributes": 'type="application/x-matlab"'}, "is of type 'application/x-matlab', and FMUs alone"),
+        ({"attributes": 'implementation="ScheduledExecution"'}, "is for ScheduledExecution, which no master runs"),
+        ({"more": '<ssd:System name="inner"/>'}, "it has a System 'inner', and components alone"),
+        (
+            {"wires": '<ssd:Connection startElement="z" startConnector="y" endElement="a" endConnector="heard"/>'},
+            "a connection names 'z', which is no component",
+        ),
+        ({"prefix": "<!DOCTYPE x [<!ENTITY e 'e'>]>"}, "SystemStructure.ssd has a DOCTYPE"),
+        ({"prefix": "\0"}, "is not in UTF-8"),
+        ({"prefix": "<"}, "is no XML"),
+    ],
+)
+def test_what_cannot_be_run_is_refused(told, sentence, by_hand):
+    with pytest.raises(MisfitError, match=sentence):
+        read_ssp(by_hand(**told))
+
+
+def test_a_path_out_of_the_archive_is_refused(by_hand, tmp_path):
+    path = by_hand()
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("../evil", "")
+    with pytest.raises(MisfitError, match=r"cannot be read as an SSP: .*\.\./evil"):
+        read_system(path)
+    assert not (tmp_path.parent / "evil").exists()
+
+
+def test_a_description_of_an_fmu_with_a_doctype_is_refused(stranger, tmp_path, capsys):
+    source, path = stranger(), tmp_path / "typed.fmu"
+    with zipfile.ZipFile(source) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            content = old.read(name)
+            new.writestr(name, content.replace(b"?>", b"?><!DOCTYPE x>", 1) if name.endswith(".xml") else content)
+    assert main(["cosim", str(path)]) == 1
+    assert "modelDescription.xml has a DOCTYPE" in capsys.readouterr().err
+
+
+def test_a_folder_for_libcosim_names_everything(stranger, tmp_path):
+    stranger()
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    assert main(["cosim", str(tmp_path / "system.toml"), "--save-as", str(tmp_path / "osp"), "--step-size", "0.1"]) == 0
+    root = etree.parse(str(tmp_path / "osp" / "OspSystemStructure.xml")).getroot()
+    names = {"o": root.nsmap[None]}
+    assert root.xpath("//o:Simulator/@source", namespaces=names) == ["a.fmu", "b.fmu"]
+    assert root.xpath("//o:InitialValue[@variable='rate']/o:Real/@value", namespaces=names) == ["2.0"]
+    assert root.xpath("//o:VariableConnection/o:Variable/@name", namespaces=names) == ["sent", "int32_in"]
+    assert (tmp_path / "osp" / "a.fmu").is_file()
