@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import hybrid_model as hm
+from cosim.cli.eta import Eta
 from cosim.cli.exits import Exit, exit_of, progress
 from cosim.cli.scenarios import scenario_of
 from cosim.errors import UsageError
+from hybrid_model.consensus.certificates.analysis import PATIENCE
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.forms import Certified, Quantity
 from hybrid_model.consensus.figures.conservatism import save_certificate_figures
@@ -40,6 +43,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="jumps (broadcasts and breakpoints) after which the run beside the bounds ends (default %(default)s)",
     )
     parser.add_argument(
+        "--patience",
+        metavar="S",
+        type=float,
+        default=PATIENCE,
+        help="CPU time in s that each quantity may take which does not scale, in networks of 16 agents or more; what "
+        "would take longer is left out (default %(default)s)",
+    )
+    parser.add_argument(
         "--out", type=Path, metavar="DIR", help="write certificates.json, and figures of the run with its bounds, there"
     )
     parser.set_defaults(run=run)
@@ -54,7 +65,8 @@ def run(options: argparse.Namespace) -> int:
     zeno = hm.ZenoGuard(max_jumps=options.max_jumps)
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=zeno)
     progress("computing the bounds")
-    found = certify(scenario, arc)
+    eta = Eta("bounds") if sys.stderr.isatty() else None
+    found = certify(scenario, arc, patience=options.patience, progress=eta)
     document = json.dumps(_document(found, details=options.details), indent=2)
     if options.out:
         progress("drawing the figures")

@@ -1,9 +1,11 @@
 """The error of slips in scenarios, and how its messages write values: short, whatever a file holds."""
 
 import math
+from collections.abc import Iterable
 
-__all__ = ["ScenarioError", "shown"]
+__all__ = ["ScenarioError", "enumerated", "shown"]
 
+_MANY, _FIRST = 30, 10
 _LONGEST = 60
 _DIGITS = 30
 _ITEMS = 12
@@ -42,3 +44,11 @@ def _whole_number(value: int) -> str:
 
 def _cut(text: str, length: int = 0) -> str:
     return text if max(len(text), length) <= _LONGEST else text[: _LONGEST - 3] + "..."
+
+
+def enumerated(values: Iterable[object]) -> str:
+    """Values with commas between them; of many the first ones, and how many there are."""
+    texts = [str(value) for value in values]
+    if len(texts) <= _MANY:
+        return ", ".join(texts)
+    return f"{', '.join(texts[:_FIRST])}, ... ({len(texts)} in all)"

@@ -14,9 +14,19 @@ from scipy.optimize import minimize_scalar
 
 from hybrid_model.consensus.certificates.components import active_edges, connected_components, union_time
 from hybrid_model.consensus.certificates.rates import tree_free_contraction
+from hybrid_model.consensus.certificates.sizes import (
+    LARGE,
+    Cost,
+    contraction_cost,
+    mean_speed,
+    memory_limit,
+    overshoot_cost,
+    worst_case_cost,
+)
 from hybrid_model.consensus.certificates.tree_bound import default_window
 from hybrid_model.consensus.certificates.windows import RateForm, best_window
 from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum
+from hybrid_model.consensus.exact.free_motion import CellMotion, ConstantMotion, SparseMotion
 from hybrid_model.consensus.exact.reachable_sets import ReachableSets
 from hybrid_model.consensus.exact.transition_grid import TransitionGrid, affordable_resolution, transition_grid
 from hybrid_model.consensus.exact.worst_case import WorstCase, worst_case
@@ -25,7 +35,13 @@ from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
 from hybrid_model.consensus.scenario.definition import Scenario
 
-__all__ = ["Analysis", "analyse"]
+__all__ = ["PATIENCE", "Analysis", "analyse"]
+
+PATIENCE = 5.0
+"""In s of CPU time, see `Analysis`."""
+
+_CELLS_MEMORY = 2**28
+"""In bytes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +58,70 @@ class Analysis:
         T [s] of the tree-wise and tree-free excitation constants.
     resolution : float
         Of the exact worst case, see `ReachableSets`.
+    patience : float
+        CPU time [s] that each quantity may take which grows faster than the cube of the number of agents, in networks
+        of `hybrid_model.consensus.certificates.sizes.LARGE` agents or more.
     """
 
     scenario: Scenario
     tree: TreePartition
     window: float
     resolution: float = 0.01
+    patience: float = PATIENCE
 
     def alike(self, scenario: Scenario) -> Analysis:
         """The analysis of the same network with other initial states or another trigger; what is known is kept."""
         # Filled by whichever of the two is asked first.
         _ = self._worst_cases, self._contractions
         other = replace(self, scenario=scenario)
-        own = {field.name for field in fields(self)} | {"initial_disagreement"}
+        own = {field.name for field in fields(self)} | {"initial_disagreement", "constant_motion"}
         other.__dict__.update({name: value for name, value in self.__dict__.items() if name not in own})
         return other
+
+    @property
+    def is_large(self) -> bool:
+        """Whether time counts."""
+        return self.scenario.network.agents >= LARGE
+
+    def affords(self, cost: Cost) -> bool:
+        """Whether something is computed."""
+        return cost.memory <= memory_limit() and (not self.is_large or cost.seconds <= self.patience)
+
+    def worst_case_cost(self, decay: float) -> Cost:
+        """Of `worst`."""
+        return worst_case_cost(self.scenario, self.cycle, decay, self.resolution, self._mean_speed)
+
+    @cached_property
+    def has_exact_contraction(self) -> bool:
+        """Whether `contraction` is exact and not left out."""
+        if not self.is_periodic or self.is_constant:
+            return self.is_periodic
+        return self.affords(contraction_cost(self.scenario, self.cycle, self.resolution, self._mean_speed))
+
+    @cached_property
+    def has_overshoot(self) -> bool:
+        """Whether `overshoot` exists and is not left out."""
+        if not self.is_periodic or self.is_constant:
+            return self.is_periodic
+        return self.affords(overshoot_cost(self.scenario, self.cycle, self._mean_speed))
+
+    @cached_property
+    def _mean_speed(self) -> float:
+        return mean_speed(self.scenario, self.cycle)
+
+    @cached_property
+    def constant_motion(self) -> ConstantMotion:
+        """The motion without errors with constant weights."""
+        return ConstantMotion(self.scenario)
+
+    @cached_property
+    def motion(self) -> SparseMotion | CellMotion:
+        """The motion without errors over a cycle, by matrices as long as they are few and small."""
+        size = self.scenario.network.agents
+        cells = self.cycle * self._mean_speed / 0.02 + len(self.scenario.edge_weights.pieces(0.0, self.cycle))
+        if 8 * cells * size**2 <= _CELLS_MEMORY:
+            return CellMotion(self.scenario, self.cells)
+        return SparseMotion(self.scenario, self.cycle)
 
     @cached_property
     def tree_weights(self) -> ExcitationConstants:
@@ -196,7 +261,11 @@ def _largest(value: Callable[[Any], Any], start: float, end: float) -> float:
 
 
 def analyse(
-    scenario: Scenario, tree: TreePartition | None = None, window: float | None = None, resolution: float = 0.01
+    scenario: Scenario,
+    tree: TreePartition | None = None,
+    window: float | None = None,
+    resolution: float = 0.01,
+    patience: float = PATIENCE,
 ) -> Analysis:
     """Choose the tree and the window that are not given.
 
@@ -225,4 +294,4 @@ def analyse(
         found = best_window(scenario, RateForm.PRINTED, tree)
         window = (found if found.rate > 0 else best_window(scenario, RateForm.VALID, tree)).window
     length = window if window is not None else default_window(scenario, tree)
-    return Analysis(scenario, tree, length, resolution)
+    return Analysis(scenario, tree, length, resolution, patience)

@@ -72,7 +72,7 @@ class Bounds:
     @property
     def floquet_overshoot(self) -> float | None:
         """``sup ||phi(t, s)|| e^{r (t - s)}`` with the exact rate r; None without a period."""
-        return self.analysis.overshoot if self.analysis.is_periodic else None
+        return self.analysis.overshoot if self.analysis.has_overshoot else None
 
     # --- errors ------------------------------------------------------------------------------------------------------
 
@@ -96,7 +96,9 @@ class Bounds:
         """R for the threshold ``exp(-beta t)``: the lesser of the exact radius and the energy bound."""
         decay = self.analysis.scenario.trigger.decay
         worst, energy = self.worst(decay), energy_radius(self.analysis, decay)
-        return None if worst is None or energy is None else min(worst.radius * worst.cover, energy)
+        if energy is None or (worst is None and not self.is_left_out(decay)):
+            return None
+        return energy if worst is None else min(worst.radius * worst.cover, energy)
 
     @property
     def sampled_slope(self) -> float | None:
@@ -116,7 +118,19 @@ class Bounds:
         rate = self.floquet_rate
         if rate is not None and (decay >= rate or self.is_beyond_reach(decay)):
             return None
-        return self.analysis.worst(decay)
+        return self.analysis.worst(decay) if self._affords_worst(decay) else None
+
+    def is_left_out(self, decay: float) -> bool:
+        """Whether the exact worst case exists and is not computed because it would take too long."""
+        rate = self.floquet_rate
+        exists = rate is None or (decay < rate and not self.is_beyond_reach(decay))
+        return exists and not self._affords_worst(decay)
+
+    def _affords_worst(self, decay: float) -> bool:
+        known: dict[float, bool] = self.__dict__.setdefault("_known_to_be_affordable", {})
+        if decay not in known:
+            known[decay] = self.analysis.affords(self.analysis.worst_case_cost(decay))
+        return known[decay]
 
     def is_beyond_reach(self, decay: float) -> bool:
         """Whether errors of so many earlier cycles count that the exact worst case is not computed."""
@@ -145,10 +159,13 @@ class Bounds:
                 continue
             # Beyond the rate no radius exists; the same part is also below one that decays half as fast as the rate.
             worst = self.worst(decay)
-            carrier = decay if worst is not None else 0.5 * (self.floquet_rate or 0.0)
+            carrier = decay if worst is not None or self.is_left_out(decay) else 0.5 * (self.floquet_rate or 0.0)
             worst = worst or self.worst(carrier)
+            energy = energy_radius(self.analysis, carrier) if worst is None else None
             if worst is not None:
                 found.append((c * worst.radius * worst.cover, carrier))
+            elif energy is not None:
+                found.append((c * energy, carrier))
         return tuple(found)
 
     # --- radius ------------------------------------------------------------------------------------------------------

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybrid_model import HybridArc, Stop
-from hybrid_model.consensus.certificates.analysis import analyse
+from hybrid_model.consensus.certificates.analysis import PATIENCE, analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.components import component_scenarios, connected_components, union_time
-from hybrid_model.consensus.certificates.forms import BOUNDS, Certified, Form, Quantity, certified_values
+from hybrid_model.consensus.certificates.forms import BOUNDS, Certified, Form, Progress, Quantity, certified_values
 from hybrid_model.consensus.certificates.hypotheses import (
     CheckedHypothesis,
     Hypothesis,
@@ -76,6 +76,8 @@ def certify(
     tree: TreePartition | None = None,
     window: float | None = None,
     resolution: float = 0.01,
+    patience: float = PATIENCE,
+    progress: Progress | None = None,
 ) -> Certificates:
     """Certify a scenario.
 
@@ -91,17 +93,25 @@ def certify(
         T [s]; by default the period, a short time for constant weights, the best one for weights without a period.
     resolution : float
         Of the exact worst case, see `hybrid_model.consensus.exact.worst_case.ReachableSets`.
+    patience : float
+        CPU time [s] that each quantity may take which grows faster than the cube of the number of agents, by an
+        estimate from sizes; what would take longer is left out in networks of 16 agents or more, with a note. What does
+        not fit into half of the memory is left out in any network.
+    progress : callable, optional
+        Called with the number of bounds that are computed, and of all.
     """
     cycle = union_time(scenario)
     general = network_hypotheses(scenario, cycle)
     if len(connected_components(scenario, cycle)) > 1:
-        return _in_components(scenario, arc, general, cycle, resolution)
-    analysis = analyse(scenario, tree, window, resolution)
+        return _in_components(scenario, arc, general, cycle, resolution, patience)
+    analysis = analyse(scenario, tree, window, resolution, patience)
     bounds = Bounds(analysis)
     # Where no radius exists, there is nothing to compare an observed one with.
-    decay = None if bounds.exact_radius is None else min((beta for _, beta in bounds.slowest), default=0.0)
+    decay: float | None = min((beta for _, beta in bounds.slowest), default=0.0)
+    if bounds.exact_radius is None and not any(bounds.is_left_out(beta) for _, beta in bounds.slowest):
+        decay = None
     seen = None if arc is None else observe(analysis, arc, decay, bounds.passing_radii)
-    values = certified_values(bounds, seen)
+    values = certified_values(bounds, seen, progress)
     further = bound_hypotheses(bounds)
     # What the bounds show takes the place of what was known without them.
     known = {hypothesis.name for hypothesis in further}
@@ -118,7 +128,12 @@ def certify(
 
 
 def _in_components(
-    scenario: Scenario, arc: HybridArc | None, hypotheses: list[CheckedHypothesis], cycle: float, resolution: float
+    scenario: Scenario,
+    arc: HybridArc | None,
+    hypotheses: list[CheckedHypothesis],
+    cycle: float,
+    resolution: float,
+    patience: float,
 ) -> Certificates:
     """No consensus of all: what holds for each connected component by itself."""
     joined, *others = hypotheses
@@ -128,7 +143,7 @@ def _in_components(
     touched = {agent for edge in _positive_edges(scenario, cycle) for agent in edge}
     for agents, alone in component_scenarios(scenario, cycle):
         if alone is not None:
-            inner = certify(alone, resolution=resolution)
+            inner = certify(alone, resolution=resolution, patience=patience)
             notes += _component_notes(agents, inner, failed)
             for form, found in gaps.items():
                 found.append(inner.value(Quantity.MIN_GAP, form))

@@ -9,6 +9,7 @@ from typing import Any
 import networkx as nx
 import numpy as np
 
+from hybrid_model.consensus.messages import enumerated
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights
 from hybrid_model.consensus.switching.base import NoSwitching
 
@@ -45,7 +46,7 @@ def joined_agents(scenario: Scenario, edges: Iterable[int]) -> list[list[int]]:
 
 def listed(components: list[list[int]]) -> str:
     """Components as the text of a sentence."""
-    return " and ".join("{" + ", ".join(map(str, agents)) + "}" for agents in components)
+    return " and ".join("{" + enumerated(agents) + "}" for agents in components)
 
 
 def component_scenarios(scenario: Scenario, cycle: float) -> list[tuple[list[int], Scenario | None]]:

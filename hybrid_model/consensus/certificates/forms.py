@@ -20,7 +20,10 @@ from hybrid_model.consensus.certificates.tree_bound import BoundForm
 from hybrid_model.consensus.certificates.verdicts import statement
 from hybrid_model.consensus.certificates.windows import RateForm
 
-__all__ = ["BOUNDS", "Bound", "Certified", "Evidence", "Form", "Quantity", "certified_values"]
+__all__ = ["BOUNDS", "Bound", "Certified", "Evidence", "Form", "Progress", "Quantity", "certified_values"]
+
+Progress = Callable[[int, int], None]
+"""Called with the number of bounds that are computed, and of all."""
 
 
 class Form(enum.StrEnum):
@@ -164,22 +167,23 @@ class Certified:
     needs: tuple[Hypothesis, ...]
 
 
-def certified_values(bounds: Bounds, seen: Observation | None) -> tuple[Certified, ...]:
+def certified_values(
+    bounds: Bounds, seen: Observation | None, progress: Progress | None = None
+) -> tuple[Certified, ...]:
     """All bounds in all forms; the observed ones are None without a run."""
     evidence = Evidence(bounds, seen)
     decay = bounds.slowest[0][1] if bounds.slowest else 0.0
     factor = "" if decay == 0 else f", times exp(-{decay:.6g} t)"
-    return tuple(
-        Certified(
-            row.quantity,
-            row.form,
-            row.value(evidence),
-            row.quantity.unit + (factor if row.quantity is Quantity.RADIUS else ""),
-            row.source,
-            row.needs if bounds.analysis.is_periodic or row.without_period is None else row.without_period,
-        )
-        for row in BOUNDS
-    )
+    found = []
+    for number, row in enumerate(BOUNDS):
+        if progress is not None:
+            progress(number, len(BOUNDS))
+        needs = row.needs if bounds.analysis.is_periodic or row.without_period is None else row.without_period
+        unit = row.quantity.unit + (factor if row.quantity is Quantity.RADIUS else "")
+        found.append(Certified(row.quantity, row.form, row.value(evidence), unit, row.source, needs))
+    if progress is not None:
+        progress(len(BOUNDS), len(BOUNDS))
+    return tuple(found)
 
 
 def _printed(place: str, row: str) -> str:

@@ -117,7 +117,7 @@ class Gaps:
     def until(self, end: float) -> float | None:
         """A gap [s] that no two broadcasts up to `end` [s] fall short of, for every beta >= 0 (audit, section 6)."""
         envelope = self.bounds.envelope
-        if not envelope or self.bounds.worst(0.0) is None:
+        if not envelope or (self.bounds.worst(0.0) is None and not self.bounds.is_left_out(0.0)):
             return None
         needed = self._needed
         if not needed:
@@ -170,17 +170,22 @@ class Gaps:
 
     def _improved(self, term: _Term) -> float | None:
         worst = self.bounds.worst(term.decay)
-        if worst is None:
+        if worst is None and not self.bounds.is_left_out(term.decay):
             return None
         analysis, c, decay = self.bounds.analysis, term.c, term.decay
         network = analysis.scenario.network
         norm, pairs = self.bounds.initial_peaks(decay) if term.has_start else (0.0, np.zeros(len(network.edges)))
         energy, theorem = energy_radius(analysis, decay), self._theorem_radius(term)
-        radius = min(worst.radius * worst.cover, math.inf if energy is None else energy) * c + norm
+        exact = math.inf if worst is None else worst.radius * worst.cover
+        radius = min(exact, math.inf if energy is None else energy) * c + norm
         radius = radius if theorem is None else min(radius, theorem)
-        reached = worst.cover * np.array([worst.pairs[edge] for edge in network.edges])
+        if not math.isfinite(radius):
+            return None
+        reached = np.full(len(network.edges), math.inf)
+        if worst is not None:
+            reached = worst.cover * np.array([worst.pairs[edge] for edge in network.edges])
         per_edge = network.gain * (np.minimum(c * reached + pairs, radius) + 2 * c)
-        touches = np.array([[i in edge for edge in network.edges] for i in range(1, network.agents + 1)])
+        touches = incidence(network.agents, network.edges) != 0
         speeds = np.minimum(self._speeds_by_degree(radius, c), (touches * analysis.largest_weights) @ per_edge)
         gap = math.inf
         for place in np.argsort(-speeds).tolist():

@@ -11,6 +11,7 @@ from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.components import active_edges, connected_components, listed
 from hybrid_model.consensus.certificates.envelopes import error_envelope
 from hybrid_model.consensus.certificates.idle_windows import idle_tree_edges, idle_window
+from hybrid_model.consensus.messages import enumerated
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 
@@ -145,8 +146,8 @@ def bound_hypotheses(bounds: Bounds) -> list[CheckedHypothesis]:
         _check(
             Hypothesis.EXCITING_TREE,
             excited,
-            f"The weights of the tree with the edges {list(analysis.tree.tree)} have mu1 = {constants.mu1:.6g}, "
-            f"mu2 = {constants.mu2:.6g} over every window of T = {constants.window:.6g} s"
+            f"The weights of the tree with the edges [{enumerated(analysis.tree.tree)}] have "
+            f"mu1 = {constants.mu1:.6g}, mu2 = {constants.mu2:.6g} over every window of T = {constants.window:.6g} s"
             + ("." if excited else f": {idle_tree_edges(analysis)}"),
         ),
         _check(
@@ -185,7 +186,7 @@ def _weak_edges(scenario: Scenario, cycle: float) -> str:
     weak = sorted(set(np.flatnonzero(ever).tolist()) - set(active_edges(scenario, cycle)))
     if not weak:
         return ""
-    names = ", ".join(str(edge + 1) for edge in weak)
+    names = enumerated(edge + 1 for edge in weak)
     carries = f"Edge {names} carries" if len(weak) == 1 else f"Edges {names} carry"
     return f" {carries} less than a share of 1e-12 of the largest integrated weight, which counts as none."
 

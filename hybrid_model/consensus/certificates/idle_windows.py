@@ -9,6 +9,7 @@ from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.certificates.components import joined_agents, listed
 from hybrid_model.consensus.excitation.persistence import window_corners
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence
+from hybrid_model.consensus.messages import enumerated
 
 __all__ = ["idle_tree_edges", "idle_window"]
 
@@ -28,7 +29,7 @@ def idle_tree_edges(analysis: Analysis) -> str:
     place = int(np.argmin(doses[:, tree].min(axis=1)))
     least = doses[place, tree]
     idle = tree[least <= max(float(least.min()), _ZERO * float(doses.max()))]
-    names = ", ".join(str(edge + 1) for edge in idle.tolist())
+    names = enumerated(edge + 1 for edge in idle.tolist())
     return f"{failing} edge {names} {_span(starts[place], analysis.window)}."
 
 
@@ -43,7 +44,7 @@ def idle_window(analysis: Analysis) -> str:
     span = f"in the window {_span(starts[place], analysis.window)}"
     if not active.size:
         return f"{span} no edge carries weight."
-    edges = ", ".join(str(edge + 1) for edge in active)
+    edges = enumerated(edge + 1 for edge in active)
     parts = listed(joined_agents(analysis.scenario, active))
     return f"{span} only the edges {edges} carry weight, and they join the agents to {parts}."
 

@@ -14,9 +14,11 @@ from hybrid_model.consensus.certificates.gaps import Gaps
 from hybrid_model.consensus.certificates.hypotheses import CheckedHypothesis, Hypothesis, follows_paper
 from hybrid_model.consensus.certificates.observation import Observation
 from hybrid_model.consensus.certificates.rates import corollary_rate, corollary_rate_exact
-from hybrid_model.consensus.certificates.tree_bound import ConvergenceBound, tree_radii
+from hybrid_model.consensus.certificates.sizes import trees_cost
+from hybrid_model.consensus.certificates.tree_bound import MOST_TREES, ConvergenceBound, TreeRadius, tree_radii
 from hybrid_model.consensus.certificates.verdicts import statement
 from hybrid_model.consensus.excitation.joint import joint_excitation
+from hybrid_model.consensus.messages import enumerated
 from hybrid_model.consensus.runs.report import edge_norm
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 from hybrid_model.consensus.switching.base import NoSwitching
@@ -37,7 +39,7 @@ def scenario_notes(bounds: Bounds, hypotheses: Sequence[CheckedHypothesis], seen
     yield from _radius_notes(bounds)
     yield from _refuted(bounds, seen)
     if seen is not None:
-        counts, states = ", ".join(map(str, seen.events_per_agent)), ", ".join(f"{x:.12f}" for x in seen.x_end)
+        counts, states = enumerated(seen.events_per_agent), enumerated(f"{x:.12f}" for x in seen.x_end)
         total = sum(seen.events_per_agent)
         yield f"The run up to {seen.end:.6g} s has {total} events, per agent {counts}, and ends in x = ({states})."
     if seen is not None and seen.radius is not None and seen.initial_share is not None:
@@ -102,7 +104,7 @@ def _constants(analysis: Analysis) -> Iterator[str]:
     window = analysis.window
     tree, m, n = analysis.tree_weights, analysis.tree_coordinates, analysis.disagreement
     yield (
-        f"Excitation over every window of T = {window:.6g} s, tree {list(analysis.tree.tree)}: "
+        f"Excitation over every window of T = {window:.6g} s, tree [{enumerated(analysis.tree.tree)}]: "
         f"W_tau mu1 = {tree.mu1:.7g}, mu2 = {tree.mu2:.7g}; M mu1 = {m.mu1:.7g}, mu2 = {m.mu2:.7g}, "
         f"sup int ||M|| = {m.mu2_bar:.7g}; N mu1 = {n.mu1:.7g}, mu2 = {n.mu2:.7g}, sup int ||N|| = {n.mu2_bar:.7g}, "
         f"||int N||_F = {n.frobenius:.7g}."
@@ -114,7 +116,7 @@ def _constants(analysis: Analysis) -> Iterator[str]:
         f"||x_e(0)|| = {edge_norm(scenario, np.asarray(scenario.network.initial)):.7g}."
     )
     if analysis.spectrum is not None and not analysis.spectrum.is_scaled:
-        multipliers = ", ".join(f"{abs(value):.6g}" for value in analysis.spectrum.multipliers)
+        multipliers = enumerated(f"{abs(value):.6g}" for value in analysis.spectrum.multipliers)
         yield f"Moduli of the Floquet multipliers over {analysis.spectrum.period:.6g} s: {multipliers}."
 
 
@@ -141,6 +143,15 @@ def _accuracy(bounds: Bounds) -> Iterator[str]:
                 f"The energy bound does not exist: {near} {analysis.cycle:.6g} s, and over no number of cycles that "
                 "was tried does disagreement fall faster than the threshold."
             )
+    if bounds.slowest and bounds.is_left_out(bounds.slowest[0][1]):
+        yield (
+            f"The exact radius is left out: for {analysis.scenario.network.agents} agents it would take "
+            f"{analysis.worst_case_cost(bounds.slowest[0][1])}. The improved gap goes by the energy bound in its place."
+        )
+    if analysis.is_periodic and not analysis.has_overshoot:
+        yield "The factor of the Floquet rate is left out: it would take too long for so many agents."
+    if analysis.is_periodic and not analysis.has_exact_contraction:
+        yield "The energy bound goes by gamma* in place of the exact contraction, which would take too long."
     if worst is None or not bounds.slowest:
         return
     fewer = ""
@@ -167,14 +178,21 @@ def _corollary(analysis: Analysis) -> Iterator[str]:
 
 def _radius_notes(bounds: Bounds) -> Iterator[str]:
     scenario = bounds.analysis.scenario
-    found = tree_radii(scenario, bounds.analysis.window) if bounds.envelope and scenario.trigger.threshold > 0 else []
+    found: list[TreeRadius] = []
+    if bounds.envelope and scenario.trigger.threshold > 0:
+        cost = trees_cost(scenario, MOST_TREES)
+        if bounds.analysis.affords(cost):
+            found = tree_radii(scenario, bounds.analysis.window)
+        else:
+            yield f"The bounds along all spanning trees are left out: {cost}."
     if len(found) > 1:
         least, most = min(found, key=lambda t: t.kappa2), max(found, key=lambda t: t.kappa2)
         best = min(found, key=lambda t: t.radius)
         yield (
             f"Over the {len(found)} exciting spanning trees, with beta = 0: kappa_2^m = {least.kappa2:.6g} (tree "
-            f"{list(least.tree)}), kappa_2^M = {most.kappa2:.6g} (tree {list(most.tree)}); every tree bounds the same "
-            f"x_e, so the least rho kappa_2 = {best.radius:.6g} (tree {list(best.tree)}) is a bound."
+            f"[{enumerated(least.tree)}]), kappa_2^M = {most.kappa2:.6g} (tree [{enumerated(most.tree)}]); every "
+            f"tree bounds the same x_e, so the least rho kappa_2 = {best.radius:.6g} (tree "
+            f"[{enumerated(best.tree)}]) is a bound."
         )
     if bounds.envelope and scenario.trigger.threshold > 0 and all(decay > 0 for _, decay in bounds.envelope):
         held = with_threshold(scenario, scenario.trigger.threshold, 0.0)

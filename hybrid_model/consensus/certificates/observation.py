@@ -94,6 +94,8 @@ def _shortest(scenario: Scenario, gap: float) -> float:
 
 def undisturbed(analysis: Analysis, end: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Times [s] of the last cycle before `end` and the states there without trigger errors, shape (n, times)."""
+    if analysis.is_large:
+        return _undisturbed_large(analysis, end)
     cells = analysis.cells
     length = float(cells.times[-1])
     count = max(0, int(np.floor(end / length)) - 1) if analysis.is_periodic else 0
@@ -108,3 +110,25 @@ def undisturbed(analysis: Analysis, end: float) -> tuple[NDArray[np.float64], ND
     mean = float(np.mean(network.initial))
     states = disagreement_basis(network.agents) @ np.array(path).T + mean
     return times[late], states[:, late]
+
+
+_TIMES = 400
+"""At which a cycle of constant weights is looked at."""
+
+
+def _undisturbed_large(analysis: Analysis, end: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """`undisturbed` of large networks."""
+    if analysis.is_constant:
+        times = np.linspace(max(0.0, end - analysis.cycle), end, _TIMES)
+        return times, analysis.constant_motion.states(times)
+    motion, state = analysis.motion, np.asarray(analysis.scenario.network.initial)
+    length = float(motion.times[-1])
+    count = max(0, int(np.floor(end / length)) - 1) if analysis.is_periodic else 0
+    state = motion.over_a_cycle(state, count)
+    path = motion.path(state)
+    times = count * length + motion.times
+    if analysis.is_periodic:
+        path = np.vstack([path[:-1], motion.path(path[-1])])
+        times = np.append(times[:-1], (count + 1) * length + motion.times)
+    late = (times <= end) & (times >= end - length)
+    return times[late], path[late].T

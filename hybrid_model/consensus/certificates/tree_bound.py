@@ -18,9 +18,17 @@ from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 
-__all__ = ["BoundForm", "ConvergenceBound", "TreeRadius", "convergence_bound", "default_window", "tree_radii"]
+__all__ = [
+    "MOST_TREES",
+    "BoundForm",
+    "ConvergenceBound",
+    "TreeRadius",
+    "convergence_bound",
+    "default_window",
+    "tree_radii",
+]
 
-_MOST_TREES = 200
+MOST_TREES = 200
 
 _SHORT = 0.01
 """``k sqrt(p) ||Lambda|| mu2`` over the window that is chosen for constant weights: short windows lose least."""
@@ -240,7 +248,7 @@ class TreeRadius:
 
 
 def tree_radii(
-    scenario: Scenario, window: float, form: BoundForm = BoundForm.VALID, most: int = _MOST_TREES
+    scenario: Scenario, window: float, form: BoundForm = BoundForm.VALID, most: int = MOST_TREES
 ) -> list[TreeRadius]:
     """The bound of theorem 2 along each exciting spanning tree, for beta = 0: the paper's kappa_2^m and kappa_2^M.
 

@@ -1,6 +1,7 @@
 """All edge weights of a network together, the diagonal of the paper's W(t): waveforms and switching in one place."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -80,7 +81,7 @@ class EdgeWeights:
         """The carrier of each edge."""
         return tuple(waveform.carrier for waveform in self.waveforms)
 
-    @property
+    @cached_property
     def period(self) -> float | None:
         """A common period [s] of all weights; 0.0 if all are constant; None if there is none."""
         return common_period([self.switching.period, *(waveform.period for waveform in self.waveforms)])
