@@ -17,8 +17,11 @@ from cosim.errors import UsageError
 from hybrid_model.consensus.certificates.analysis import PATIENCE
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.forms import Certified, Quantity
+from hybrid_model.consensus.certificates.sizes import LARGE
 from hybrid_model.consensus.figures.conservatism import save_certificate_figures
+from hybrid_model.consensus.laws.agent_network import agent_network
 from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-audit.md of this project"
 """What the short names in the sources of values mean."""
@@ -63,14 +66,23 @@ def run(options: argparse.Namespace) -> int:
     scenario = scenario_of(options.scenario)
     progress("running the closed loop")
     zeno = hm.ZenoGuard(max_jumps=options.max_jumps)
-    arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=zeno)
+    large = scenario.network.agents >= LARGE and scenario.trigger.kind is not TriggerKind.CONTINUOUS
+    arc: hm.HybridArc | hm.NetworkRun
+    if large:
+        arc = hm.simulate_network(agent_network(scenario), scenario.stop_time, zeno=zeno)
+    else:
+        arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=zeno)
     progress("computing the bounds")
     eta = Eta("bounds") if sys.stderr.isatty() else None
     found = certify(scenario, arc, patience=options.patience, progress=eta)
     document = json.dumps(_document(found, details=options.details), indent=2)
     if options.out:
-        progress("drawing the figures")
-        save_certificate_figures(found, arc, options.out)
+        if isinstance(arc, hm.HybridArc):
+            progress("drawing the figures")
+            save_certificate_figures(found, arc, options.out)
+        else:
+            print(f"hybrid-fmu: figures are of networks with fewer than {LARGE} agents.", file=sys.stderr)
+            options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "certificates.json").write_text(document + "\n", encoding="utf-8")
     print(document if options.json else _text(found))
     # Bounds are there also where the thresholds vanish too fast for the run; a note says how far it came.

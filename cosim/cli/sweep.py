@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from cosim.cli.eta import Eta
 from cosim.cli.exits import Exit
 from cosim.errors import UsageError
+from hybrid_model.consensus.figures.study import save_study_figures
 from hybrid_model.consensus.sweeps.designs import Design
 from hybrid_model.consensus.sweeps.errors import SweepError
 from hybrid_model.consensus.sweeps.execute import run_sweep
@@ -63,6 +65,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask scheduler, whose workers run instead")
     parser.add_argument("--csv", type=Path, metavar="F.csv", help="write the rows there at the end")
     parser.add_argument("--parquet", type=Path, metavar="F.parquet", help="write the rows there at the end")
+    parser.add_argument(
+        "--figures",
+        type=Path,
+        metavar="DIR",
+        help="write maps over the first two keys there, and broadcasts against radii of a sweep over thresholds",
+    )
     parser.set_defaults(run=run)
 
 
@@ -76,6 +84,10 @@ def run(options: argparse.Namespace) -> int:
                 write_csv(table, options.csv)
             if options.parquet:
                 write_parquet(table, options.parquet)
+            if options.figures and not save_study_figures(table, options.figures):
+                print(
+                    "hybrid-fmu: there is nothing to draw of this sweep: vary two keys with numbers.", file=sys.stderr
+                )
             failures, count = table.failures, len(table)
     except SweepError as error:
         raise UsageError(str(error)) from error

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from hybrid_model import HybridArc, Stop
+from hybrid_model import HybridArc, NetworkRun, Stop
 from hybrid_model.consensus.certificates.analysis import PATIENCE, analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.components import component_scenarios, connected_components, union_time
@@ -20,7 +20,7 @@ from hybrid_model.consensus.certificates.hypotheses import (
 from hybrid_model.consensus.certificates.notes import scenario_notes
 from hybrid_model.consensus.certificates.observation import observe
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
-from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.runs.report import report_of
 from hybrid_model.consensus.scenario.definition import Scenario
 
 __all__ = ["Certificates", "certify"]
@@ -71,7 +71,7 @@ class Certificates:
 
 def certify(
     scenario: Scenario,
-    arc: HybridArc | None = None,
+    arc: HybridArc | NetworkRun | None = None,
     *,
     tree: TreePartition | None = None,
     window: float | None = None,
@@ -85,8 +85,8 @@ def certify(
     ----------
     scenario : Scenario
         Network, weights, switching, trigger.
-    arc : HybridArc, optional
-        A run of its closed loop, for the observed values.
+    arc : HybridArc or NetworkRun, optional
+        A run of its closed loop or of its agents as a network, for the observed values.
     tree : TreePartition, optional
         Spanning tree of the tree-wise forms; by default the first in edge order whose edges all carry weight.
     window : float, optional
@@ -129,7 +129,7 @@ def certify(
 
 def _in_components(
     scenario: Scenario,
-    arc: HybridArc | None,
+    arc: HybridArc | NetworkRun | None,
     hypotheses: list[CheckedHypothesis],
     cycle: float,
     resolution: float,
@@ -154,7 +154,7 @@ def _in_components(
         else:
             notes.append(f"Agent {agents[0]} never moves and never broadcasts.")
     known = {form: _least(found) for form, found in gaps.items()}
-    known[Form.OBSERVED] = None if arc is None else run_report(scenario, arc).min_gap
+    known[Form.OBSERVED] = None if arc is None else report_of(scenario, arc).min_gap
     values = tuple(
         Certified(
             row.quantity,
@@ -191,7 +191,7 @@ def _least(gaps: list[float | None]) -> float | None:
     return min(known) if known and len(known) == len(gaps) else None
 
 
-def _early_end(arc: HybridArc | None) -> list[str]:
+def _early_end(arc: HybridArc | NetworkRun | None) -> list[str]:
     """A sentence on a run that did not reach its stop time; what was observed is of that part only."""
     if arc is None or arc.stop is Stop.HORIZON:
         return []

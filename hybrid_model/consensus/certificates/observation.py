@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid_model import HybridArc
+from hybrid_model import HybridArc, NetworkRun
 from hybrid_model.consensus.certificates.analysis import Analysis
 from hybrid_model.consensus.graphs.undirected import disagreement_basis
 from hybrid_model.consensus.runs.metrics import run_states
-from hybrid_model.consensus.runs.report import edge_norm, run_report
+from hybrid_model.consensus.runs.report import edge_norm, report_of
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 
@@ -55,7 +55,7 @@ class Observation:
 
 
 def observe(
-    analysis: Analysis, arc: HybridArc, decay: float | None, faster: Sequence[tuple[float, float]] = ()
+    analysis: Analysis, arc: HybridArc | NetworkRun, decay: float | None, faster: Sequence[tuple[float, float]] = ()
 ) -> Observation:
     """Take the figures from the run of a scenario's closed loop.
 
@@ -63,17 +63,17 @@ def observe(
     ----------
     analysis : Analysis
         The scenario; its cycle decides which part of the run counts as late.
-    arc : HybridArc
-        The run of ``closed_loop(scenario)``.
+    arc : HybridArc or NetworkRun
+        The run of ``closed_loop(scenario)`` or of ``agent_network(scenario)``.
     decay : float or None
         beta [1/s] of the slowest part of the bound on the errors; None if there is no bound, and then no radius.
     faster : sequence of (radius, decay)
         Of the parts that decay faster: what they add to ``||x_e(t)||`` is at most ``radius exp(-decay t)``.
     """
     scenario = analysis.scenario
-    report = run_report(scenario, arc)
-    gap, shown = report.min_gap, (float(arc.t[-1]), tuple(report.events_per_agent), tuple(report.x_end.tolist()))
-    times, free = undisturbed(analysis, float(arc.t[-1]))
+    report, end = report_of(scenario, arc), float(arc.t if isinstance(arc, NetworkRun) else arc.t[-1])
+    gap, shown = report.min_gap, (end, tuple(report.events_per_agent), tuple(report.x_end.tolist()))
+    times, free = undisturbed(analysis, end)
     shortest = None if gap is None else _shortest(scenario, gap)
     if decay is None:
         return Observation(shortest, None, None, *shown)

@@ -15,6 +15,7 @@ from hybrid_model.consensus.runs.communication import communication, gap_statist
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.record.arc import HybridArc
+from hybrid_model.schedule.network_run import NetworkRun
 
 __all__ = [
     "Performance",
@@ -34,8 +35,10 @@ States = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """States of all agents, shape (n, times), at ascending times [s]."""
 
 
-def run_states(scenario: Scenario, arc: HybridArc) -> States:
-    """The states of a run of ``closed_loop(scenario)`` as a function of time."""
+def run_states(scenario: Scenario, arc: HybridArc | NetworkRun) -> States:
+    """The states of a run of ``closed_loop(scenario)`` or ``agent_network(scenario)`` as a function of time."""
+    if isinstance(arc, NetworkRun):
+        return lambda times: arc.at("x", times)
     names = [f"{agent_name(i)}.x" for i in range(1, scenario.network.agents + 1)]
 
     def states(times: NDArray[np.float64]) -> NDArray[np.float64]:

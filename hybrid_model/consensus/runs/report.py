@@ -113,6 +113,11 @@ def report_of_network(scenario: Scenario, run: NetworkRun) -> RunReport:
     )
 
 
+def report_of(scenario: Scenario, run: HybridArc | NetworkRun) -> RunReport:
+    """Take the figures of a run of either kind."""
+    return report_of_network(scenario, run) if isinstance(run, NetworkRun) else run_report(scenario, run)
+
+
 def broadcast_times(arc: HybridArc, name: str) -> FloatArray:
     """Return the times in s of an agent's broadcasts; none for an agent that broadcasts continuously."""
     jump = f"{name}.trigger.broadcast"
