@@ -213,9 +213,11 @@ class MacroSteps:
         if t + self._resolution > self._t_stop:
             return False
         state = slave.save()
-        made = slave.step(self._at[slave.name], t + self._resolution)
-        slave.restore(state)
-        slave.release(state)
+        try:
+            made = slave.step(self._at[slave.name], t + self._resolution)
+            slave.restore(state)
+        finally:
+            slave.release(state)
         return made.event or made.terminated is not None
 
     def _leaps(self, slave: Slave, read: Callable[[], list[float]], t: float) -> bool:
@@ -223,10 +225,12 @@ class MacroSteps:
         if t + self._resolution > self._t_stop:
             return False
         state, before = slave.save(), read()
-        made = slave.step(self._at[slave.name], t + self._resolution)
-        after = read()
-        slave.restore(state)
-        slave.release(state)
+        try:
+            made = slave.step(self._at[slave.name], t + self._resolution)
+            after = read()
+            slave.restore(state)
+        finally:
+            slave.release(state)
         far = any(abs(b - a) > LEAP * max(abs(a), abs(b)) for a, b in zip(before, after, strict=True))
         return far or made.terminated is not None
 

@@ -1,0 +1,168 @@
+"""What goes wrong in runs: endless iterations, states that are not freed, interrupts and kills."""
+
+import csv
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from strangers import ITERATES
+
+import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
+from cosim.errors import CosimError
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_error_controlled, run_event_exact
+from cosim.system import System
+from hybrid_model.models import BouncingBall
+from hybrid_model.models.ball_on_moving_table import BallOnMovingTable
+from hybrid_model.schedule.blocks import Update
+
+ON_A_BALL = {"second.table": "first.h", "second.table_velocity": "first.v"}
+
+
+class Integrates(hm.HybridAutomaton):
+    u = hm.Input(0.0)
+    x = hm.State(0.0, output=True)
+
+    def flow_map(self, s):
+        return {"x": s.u}
+
+
+class Counting(AutomatonSlave):
+    """Counts the states that it has given and not got back."""
+
+    held = 0
+
+    def save(self):
+        type(self).held += 1
+        return super().save()
+
+    def release(self, state):
+        type(self).held -= 1
+        super().release(state)
+
+
+class Late(Counting):
+    """Fails in a step from 0.4 s on."""
+
+    def step(self, t, t_next):
+        if t > 0.4:
+            raise CosimError("late fails")
+        return super().step(t, t_next)
+
+
+@pytest.mark.parametrize("master", [run_event_exact, run_error_controlled])
+def test_event_iterations_without_end_are_ended_with_the_name(master, stranger):
+    slave = FmuSlave("stranger", stranger())
+    slave.set("behaviour", ITERATES)
+    with pytest.raises(CosimError, match=r"stranger asks for more than \d+ event iterations at t = 0 s"):
+        master(System([slave], {}), 1.0)
+
+
+def test_an_event_that_is_said_to_be_in_the_past_is_refused():
+    class Backward(AutomatonSlave):
+        def update(self):
+            return Update(False, (), -1.0)
+
+    with pytest.raises(CosimError, match=r"it is at t = 0 s|is at t = 0 s and says that its next event is at -1 s"):
+        run_event_exact(System([Backward("back", BouncingBall())], {}), 1.0)
+
+
+def test_a_change_seen_in_an_early_iteration_alone_is_not_lost():
+    """The second of three iterations asks for no more than the first did; the ticks of all count."""
+
+    class Thrice(AutomatonSlave):
+        count = 0
+
+        def update(self):
+            made = super().update()
+            self.count += 1
+            return Update(self.count % 3 != 0, ("impact",) if self.count == 4 else (), made.next_event)
+
+    result = run_event_exact(System([Thrice("ball", BouncingBall())], {}), 0.6)
+    assert [tick.clock for tick in result.ticks] == ["impact"]
+
+
+@pytest.mark.parametrize("kind", [Counting, Late])
+def test_all_saved_states_are_freed(kind):
+    Counting.held = Late.held = 0
+    slaves = [Counting("first", BouncingBall()), kind("second", BallOnMovingTable(h=1.2))]
+    system = System(slaves, ON_A_BALL)
+    if kind is Late:
+        with pytest.raises(CosimError, match="late fails"):
+            run_error_controlled(system, 0.6)
+    else:
+        run_error_controlled(system, 0.6)
+    assert (Counting.held, Late.held) == (0, 0)
+
+
+def test_an_input_is_read_once_however_often_it_is_sent():
+    """Later it holds what was sent, so vectors are not read to be written."""
+
+    class Reads(AutomatonSlave):
+        reads = 0
+
+        def get(self, name):
+            self.reads += name in self.inputs
+            return super().get(name)
+
+    class Counts(hm.HybridAutomaton):
+        ticks = hm.DiscreteState(0.0, output=True)
+
+        def due(self, s):
+            return (s.ticks + 1.0) * 0.1
+
+        def tick(self, s):
+            return {"ticks": s.ticks + 1.0}
+
+        transitions = (hm.TimeEvent("tick", due, tick),)
+
+    class Hears(hm.HybridAutomaton):
+        heard = hm.Input([0.0, 0.0], discrete=True)
+        total = hm.Output()
+
+        def outputs(self, s):
+            return {"total": s.heard[0] + s.heard[1]}
+
+    slaves = [AutomatonSlave("counts", Counts()), Reads("hears", Hears())]
+    result = run_event_exact(System(slaves, {"hears.heard": ["counts.ticks", "counts.ticks"]}), 1.05)
+    assert result.final["hears.total"] == 20.0
+    assert slaves[1].reads == 2
+
+
+def begun(path, table, tmp_path):
+    """Start a run that takes long, in a folder for temporary files of its own; return it when there are rows."""
+    places = tmp_path / "temporary"
+    places.mkdir()
+    command = [sys.executable, "-m", "cosim.cli.main", "cosim", str(path), "--output-file", str(table)]
+    run = subprocess.Popen(command, env={**os.environ, "TMPDIR": str(places)}, stderr=subprocess.PIPE, text=True)
+    began = time.monotonic()
+    while not (table.exists() and table.stat().st_size > 5000):
+        assert run.poll() is None
+        assert time.monotonic() - began < 60.0
+        time.sleep(0.05)
+    return run, places
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
+def test_a_run_that_is_stopped_leaves_rows_and_no_folders(sent, status, stranger, tmp_path):
+    path = stranger(events=False, experiment='stopTime="1000" stepSize="1e-4"')
+    table = tmp_path / "out.csv"
+    run, places = begun(path, table, tmp_path)
+    run.send_signal(sent)
+    error = run.communicate(timeout=30.0)[1]
+    assert run.returncode == status
+    with table.open(newline="") as file:
+        rows = list(csv.reader(file))
+    assert {len(row) for row in rows} == {len(rows[0])}
+    assert float(rows[-1][0]) == pytest.approx(1e-4 * (len(rows) - 2))
+    if sent is signal.SIGINT:
+        assert "out.csv has what there was up to t = " in error
+    began = time.monotonic()
+    while any(places.iterdir()) and time.monotonic() - began < 20.0:
+        time.sleep(0.05)
+    assert list(places.iterdir()) == []
