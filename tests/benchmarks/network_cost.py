@@ -1,64 +1,144 @@
-"""What an event costs in a network run part by part, for few and for many agents.
+"""What an event costs in networks run part by part, from a hundred agents on, and what memory they take.
 
-``PYTHONPATH=tests python -m benchmarks.network_cost`` prints the table. The networks are rings of agents with constant
-weights and a static trigger; their starts are drawn from one distribution, so each agent has about as many events in a
-large ring as in a small one. Times are CPU time of the run without the set-up, in turns, and the median of the ratios.
+``PYTHONPATH=tests python -m benchmarks.network_cost`` prints the table. Agents have gated-sine weights and a dynamic
+trigger; their starts are drawn from one distribution, so each has about as many events in a large ring as in a small
+one. Each row is a process of its own: CPU time of the run without the set-up, least of some rounds for small networks,
+and the largest memory of the process. The rival is a loop around `scipy.integrate.solve_ivp` with one guard, the
+largest error beyond its threshold, which is restarted at each event and at each edge of the gates.
 """
 
 import argparse
-import statistics
+import json
+import math
+import resource
+import subprocess
+import sys
 import time
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 import hybrid_model as hm
-from hybrid_model import consensus
+from hybrid_model.consensus.graphs.generators import graph_of_kind
+from hybrid_model.consensus.laws.agents import Integrator, agent
+from hybrid_model.consensus.laws.threshold_triggers import DynamicTrigger
+from hybrid_model.consensus.weights.gated_sine import GatedSine
+from hybrid_model.consensus.weights.kinds import weights_block
 
-SMALL = 10
-
-
-def ring(agents, seed):
-    """A ring of agents with the paper's static trigger."""
-    entries = {
-        "name": f"ring of {agents}",
-        "stop_time": 1.0,
-        "network": {
-            "agents": agents,
-            "edges": [[k, k % agents + 1] for k in range(1, agents + 1)],
-            "initial": list(np.random.default_rng(seed).uniform(-1.0, 1.0, agents)),
-        },
-        "weights": {"kind": "constant", "value": 1.0},
-        "trigger": {"kind": "static", "threshold": 0.1},
-    }
-    return consensus.closed_loop(consensus.read_scenario(entries))
+END, THRESHOLD, DECAY = 30.0, 0.05, 0.06
+WAVE = GatedSine(4.0, 5.0, 20.0)
+ROUNDS = {100: 5, 1000: 3}
 
 
-def cost(network, t_end):
-    """CPU time for each event, in s, and the number of events."""
+def links_of(graph, agents):
+    """Receivers and senders; the ring without a graph in memory."""
+    if graph == "ring":
+        k = np.arange(agents)
+        return np.concatenate([k, k]), np.concatenate([(k - 1) % agents, (k + 1) % agents])
+    # Sparse graphs of random places are hardly ever connected at this degree; each component is a network of its own.
+    edges = np.array(graph_of_kind(graph, agents, 16.0 if graph == "geometric" else 4.0).edges) - 1
+    return edges.ravel(), edges[:, ::-1].ravel()
+
+
+def starts(agents):
+    return np.random.default_rng(0).uniform(-1.0, 1.0, agents)
+
+
+def network(graph, agents):
+    """The agents, as arrays."""
+
+    def part(degree):
+        weights = weights_block([WAVE] * degree)
+        return agent("agent", Integrator(degree=degree), weights, DynamicTrigger(threshold=THRESHOLD, decay=DECAY))
+
+    values = {"x": starts(agents)}
+    signals = {"neighbours": "broadcast"}
+    return hm.Network(f"{graph} of {agents}", part, links_of(graph, agents), signals, values=values, count=agents)
+
+
+def measured(graph, agents):
+    """One row: events, CPU time of the run in s, drift of the mean, memory in MB."""
+    from hybrid_model.schedule import native_network
+
+    made, spent = network(graph, agents), []
+    run_table = native_network.run_table
+
+    def timed(*given):
+        began = time.process_time()
+        found = run_table(*given)
+        spent.append(time.process_time() - began)
+        return found
+
+    native_network.run_table = timed
+    for _ in range(ROUNDS.get(agents, 1)):
+        run = hm.simulate_network(made, END, engine="native")
+    drift = abs(float(np.mean(run.final("x")) - np.mean(starts(agents))))
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3
+    return {"events": len(run.events), "seconds": min(spent), "drift": drift, "memory": memory}
+
+
+def with_scipy(agents):
+    """The ring in a loop around SciPy's DOP853: events, and CPU time in s."""
     began = time.process_time()
-    run = hm.simulate_network(network, t_end)
-    spent = time.process_time() - began
-    return spent / len(run.jumps), len(run.jumps)
+    x, t, events = starts(agents), 0.0, 0
+    sent = x.copy()
+    edges = [*WAVE.breakpoints(0.0, END), END]
+
+    def rates(t, x):
+        return -weight(t) * (2.0 * sent - np.roll(sent, 1) - np.roll(sent, -1))
+
+    def guard(t, x):
+        return np.max(np.abs(x - sent)) - THRESHOLD * math.exp(-DECAY * t)
+
+    guard.terminal, guard.direction = True, 1.0
+    for edge in edges:
+        is_open = float(WAVE.amplitude(0.5 * (t + edge)))
+
+        def weight(t, is_open=is_open):
+            return is_open * 4.0 * math.sin(5.0 * t) ** 2
+
+        while t < edge:
+            piece = solve_ivp(rates, (t, edge), x, method="DOP853", rtol=1e-10, atol=1e-12, events=guard)
+            t, x = float(piece.t[-1]), piece.y[:, -1]
+            if piece.status == 1:
+                errors = np.abs(x - sent)
+                fires = errors >= errors.max() * (1.0 - 1e-12)
+                events += int(fires.sum())
+                sent[fires] = x[fires]
+    return {"events": events, "seconds": time.process_time() - began, "memory": 0.0, "drift": 0.0}
+
+
+def in_a_process(what, graph, agents):
+    call = [sys.executable, "-m", "benchmarks.network_cost", "--row", what, graph, str(agents)]
+    return json.loads(subprocess.run(call, check=True, capture_output=True, text=True).stdout)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--agents", type=int, nargs="*", default=[100, 1000])
-    parser.add_argument("--rounds", type=int, default=3)
-    parser.add_argument("--t-end", type=float, default=1.0)
+    parser.add_argument("--agents", type=int, nargs="*", default=[100, 1000, 10_000, 100_000])
+    parser.add_argument("--graphs", nargs="*", default=["ring", "geometric", "star"])
+    parser.add_argument("--row", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    print("| agents | events | CPU time per event in ms | ratio to 10 agents |\n| --- | --- | --- | --- |")
-    # As many small rings as make up a thousand agents would be: the mean of several keeps chance small.
-    small = [ring(SMALL, seed) for seed in range(10)]
-    for agents in options.agents:
-        large = ring(agents, 0)
-        ratios, costs, events = [], [], 0
-        for _ in range(options.rounds):
-            base = statistics.mean(cost(network, options.t_end)[0] for network in small)
-            spent, events = cost(large, options.t_end)
-            costs.append(spent)
-            ratios.append(spent / base)
-        print(f"| {agents} | {events} | {1e3 * statistics.median(costs):.2f} | {statistics.median(ratios):.2f} |")
+    if options.row:
+        what, graph, agents = options.row
+        print(json.dumps(with_scipy(int(agents)) if what == "scipy" else measured(graph, int(agents))))
+        return
+    print("| graph | agents | events | CPU time in s | per event in us | drift of the mean | memory in MB |")
+    print("| --- | --- | --- | --- | --- | --- | --- |")
+    for graph in options.graphs:
+        for agents in options.agents:
+            # A hub with more neighbours is a map of too many instructions for a compiler.
+            if graph == "star" and agents > 1000:
+                continue
+            row = in_a_process("native", graph, agents)
+            print(
+                f"| {graph} | {agents} | {row['events']} | {row['seconds']:.3g} | "
+                f"{1e6 * row['seconds'] / row['events']:.1f} | {row['drift']:.0e} | {row['memory']:.0f} |",
+                flush=True,
+            )
+    row = in_a_process("scipy", "ring", 100)
+    per_event = 1e6 * row["seconds"] / row["events"]
+    print(f"| ring, SciPy with one guard | 100 | {row['events']} | {row['seconds']:.3g} | {per_event:.0f} | | |")
 
 
 if __name__ == "__main__":
