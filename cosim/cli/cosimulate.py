@@ -12,6 +12,7 @@ from pathlib import Path
 from cosim.cli import run_files
 from cosim.cli.exits import Exit, exit_of, given_values, progress
 from cosim.cli.run_files import RunFiles
+from cosim.cli.step_study import study
 from cosim.consensus import fmu_system
 from cosim.errors import CosimError, UsageError
 from cosim.isolation.isolated_slave import PATIENCE
@@ -94,6 +95,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="F.ssp|DIR",
         help="do not run: write the system as an SSP, or as a folder for libcosim (OspSystemStructure.xml)",
     )
+    parser.add_argument(
+        "--step-study",
+        type=Path,
+        metavar="DIR",
+        help="of a scenario: how far its agents with fixed steps are from the event-exact run, a table and a figure",
+    )
     parser.add_argument("--ssp-version", choices=VERSIONS, default=VERSIONS[0])
     parser.add_argument("--isolate", action="store_true", help="run each FMU in a process of its own")
     parser.add_argument(
@@ -108,8 +115,13 @@ def run(options: argparse.Namespace) -> int:
     folder = temporary_folder()
     try:
         definition = read_system(options.system)
+        if definition is not None and options.step_study is not None:
+            raise UsageError(f"--step-study is for scenarios, and {options.system} is none.")
         if definition is None:
             scenario = load_scenario(options.system)
+            if options.step_study is not None:
+                print(*study(scenario, options.step_study), sep="\n")
+                return int(Exit.DONE)
             system, experiment = _agents(scenario, folder), Experiment(stop_time=scenario.stop_time)
             fmus = [Component(name, FMU, str(folder / f"{name}.fmu")) for name in system.slaves]
             definition = SystemDefinition(scenario.name, fmus, broadcast_wires(scenario))
