@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,8 @@ AUTOMATON_AGENTS = 8
 
 MOST_AT_EVENTS = 5_000_000
 """Agents times events: beyond, the trajectory is on its grid only."""
+MOST_SHOWN = 50
+"""Agents whose numbers are in the text; run.json has all."""
 MOST_POINTS = 1e7
 """Of a trajectory; one that is longer fills the memory."""
 
@@ -43,6 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output-interval", type=float, default=0.1, help="spacing of the trajectory in s")
     parser.add_argument("--json", action="store_true", help="print the run as a JSON object")
     parser.add_argument("--out", type=Path, metavar="DIR", help="write run.json and trajectory.csv there")
+    parser.add_argument(
+        "--events",
+        type=Path,
+        metavar="DIR",
+        help="write the events of a network there as they come (hybrid_model.load_network_events reads them)",
+    )
     parser.set_defaults(run=run)
 
 
@@ -54,7 +63,12 @@ def run(options: argparse.Namespace) -> int:
         scenario = dataclasses.replace(scenario, stop_time=options.stop_time)
     _require_points(scenario.stop_time, options.output_interval)
     one = options.engine == "automaton" or (options.engine == "auto" and scenario.network.agents <= AUTOMATON_AGENTS)
-    report, times, signals = (_as_one if one else _as_network)(scenario, options.output_interval, bool(options.out))
+    if one and options.events:
+        raise UsageError("--events goes with --engine network: one automaton keeps its run in memory.")
+    if one:
+        report, times, signals = _as_one(scenario, options.output_interval, bool(options.out))
+    else:
+        report, times, signals = _as_network(scenario, options.output_interval, bool(options.out), options.events)
     document = json.dumps({"scenario": scenario.name, **report.as_dict(), "message": report.message}, indent=2)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
@@ -97,8 +111,11 @@ def _both_sides(times: Any, jumps: Any) -> tuple[Any, Any]:
     return rows, before
 
 
-def _as_network(scenario: Scenario, interval: float, wanted: bool) -> tuple[RunReport, Any, dict[str, Any]]:
-    run = hm.simulate_network(agent_network(scenario), scenario.stop_time, progress=sys.stderr.isatty())
+def _as_network(
+    scenario: Scenario, interval: float, wanted: bool, events: Path | None
+) -> tuple[RunReport, Any, dict[str, Any]]:
+    told = sys.stderr.isatty()
+    run = hm.simulate_network(agent_network(scenario), scenario.stop_time, events_to=events, progress=told)
     times, jumps = np.minimum(np.arange(int(np.ceil(run.t / interval)) + 1) * interval, run.t), np.unique(run.events.t)
     if scenario.network.agents * len(jumps) > MOST_AT_EVENTS:
         jumps = jumps[:0]
@@ -115,15 +132,22 @@ def _as_network(scenario: Scenario, interval: float, wanted: bool) -> tuple[RunR
 
 
 def _text(scenario: Scenario, report: RunReport) -> str:
-    agents = ", ".join(map(str, report.events_per_agent))
+    agents = _listed(map(str, report.events_per_agent))
     gap = "none" if report.min_gap is None else f"{report.min_gap:.6g} s"
     return "\n".join(
         [
             f"{scenario.name}: {report.message}",
             f"  events          {sum(report.events_per_agent)} (per agent {agents})",
             f"  shortest gap    {gap}",
-            f"  final states    {', '.join(f'{x:.9g}' for x in report.x_end)}",
+            f"  final states    {_listed(f'{x:.9g}' for x in report.x_end)}",
             f"  |x_e| at end    {report.edge_norm_end:.6g}",
             f"  drift of mean   {report.mean_drift:.2g}",
         ]
     )
+
+
+def _listed(texts: Iterable[str]) -> str:
+    """Return texts in a row, the first ones of many."""
+    every = list(texts)
+    more = f", and {len(every) - MOST_SHOWN} more" if len(every) > MOST_SHOWN else ""
+    return ", ".join(every[:MOST_SHOWN]) + more

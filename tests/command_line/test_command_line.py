@@ -45,6 +45,16 @@ def test_engines_agree(small, capsys):
         assert first == pytest.approx(second, abs=1e-9)
 
 
+def test_events_of_a_network_go_to_a_folder(small, tmp_path, capsys):
+    folder = str(tmp_path / "events")
+    assert main(["simulate", small, "--json", "--engine", "network", "--events", folder]) == 0
+    run = json.loads(capsys.readouterr().out)
+    events = hm.load_network_events(folder)
+    assert len(events) == events.named("trigger.broadcast").sum() == run["events_total"]
+    assert main(["simulate", small, "--engine", "automaton", "--events", folder]) == 2
+    assert "--events goes with --engine network" in capsys.readouterr().err
+
+
 def test_simulate_writes_run_and_trajectory(small, tmp_path, capsys):
     assert main(["simulate", small, "--stop-time", "1.05", "--out", str(tmp_path / "out")]) == 0
     assert json.loads((tmp_path / "out" / "run.json").read_text())["scenario"] == "small"

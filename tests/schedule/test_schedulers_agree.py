@@ -152,3 +152,74 @@ def test_stiff_parts_run_with_a_method_for_them():
     whole = hm.simulate(network, 1.0, engine="native")
     for part in "ab":
         assert run.event_times(part, "send") == pytest.approx(whole.event_times(f"{part}.send"), abs=1e-8)
+
+
+class Talker(hm.HybridAutomaton):
+    """Drifts to what it hears and sends its state when that has moved; counts what it gets in jumps of its own."""
+
+    degree = hm.Dimension()
+    threshold = hm.Parameter(0.2)
+    heard = hm.Input(0.0, shape="degree", discrete=True)
+    x = hm.State(0.0, output=True)
+    sent = hm.DiscreteState(0.0, output=True, computed=True)
+    noticed = hm.DiscreteState(0.0, computed=True)
+    phase = hm.DiscreteState(0, integer=True)
+    answer = hm.Output(discrete=True)
+
+    def start_map(self, s):
+        return {"sent": s.x, "noticed": np.sum(s.heard)}
+
+    def flow_map(self, s):
+        return {"x": np.cos(3.0 * s.t) * np.where(s.phase % 2 < 0.5, 1.0, 0.5) + np.sum(s.heard) - s.sent}
+
+    def outputs(self, s):
+        return {"answer": 0.5 * s.sent}
+
+    transitions = (
+        hm.TimeEvent(
+            "turn", lambda self, s: 0.3 * (s.phase + 1.0), lambda self, s: {"phase": s.phase + 1}, internal=True
+        ),
+        hm.Jump("send", lambda self, s: abs(s.x - s.sent) - s.threshold, lambda self, s: {"sent": s.x}),
+        hm.Jump(
+            "notice",
+            lambda self, s: abs(np.sum(s.heard) - s.noticed) - 0.25,
+            lambda self, s: {"noticed": np.sum(s.heard), "x": s.x + 0.01},
+        ),
+    )
+
+
+@settings(max_examples=4, deadline=None)
+@given(data=st.data(), count=st.integers(1, 4), by=st.sampled_from(["sent", "answer"]))
+def test_random_wires(data, count, by):
+    assert_wired_alike(data, count, by, 1.0)
+
+
+@pytest.mark.long
+@settings(max_examples=80, deadline=None)
+@given(data=st.data(), count=st.integers(1, 5), by=st.sampled_from(["sent", "answer"]))
+def test_many_random_wires(data, count, by):
+    assert_wired_alike(data, count, by, 1.5)
+
+
+def assert_wired_alike(data, count, by, t_end):
+    """Loops, parts that hear themselves, states and outputs, and parts that hear nobody."""
+    pairs = [(i, j) for i in range(count) for j in range(count)]
+    links = data.draw(st.lists(st.sampled_from(pairs), max_size=6, unique=True))
+    drawn = st.lists(st.floats(-1.0, 1.0).map(lambda x: round(x, 3)), min_size=count, max_size=count)
+    columns = tuple(np.array([link[k] for link in links], np.int64) for k in (0, 1))
+    # Thresholds apart, so that no two parts are so alike that rounding decides.
+    values = {"x": np.array(data.draw(drawn)), "threshold": 0.2 + 0.0137 * np.arange(count)}
+    network = hm.Network(
+        "random", lambda degree: Talker(degree=degree), columns, {"heard": by}, values=values, count=count
+    )
+    native, plain = (hm.simulate_network(network, t_end, engine=engine) for engine in ("native", "python"))
+    assert native.stop is plain.stop
+    assert sorted(happened(native)) == sorted(happened(plain))
+    for part in network.parts:
+        for one, two in zip(native.arcs[part].jumps, plain.arcs[part].jumps, strict=True):
+            assert one.name == two.name
+            assert one.t == pytest.approx(two.t, abs=1e-8)
+            np.testing.assert_allclose(one.x_after, two.x_after, rtol=0.0, atol=1e-8)
+    if native.stop is hm.Stop.HORIZON:
+        np.testing.assert_allclose(native.final("x"), plain.final("x"), rtol=0.0, atol=1e-9)
+        assert hm.verify(network.copy(0), native.arcs["part1"]).ok
