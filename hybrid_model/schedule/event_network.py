@@ -93,6 +93,8 @@ def simulate_network(
         As `simulate`.
     SchedulingError
         If a part asks for event iterations without end.
+    KeyboardInterrupt
+        If the run is interrupted from outside; its attribute `events` has what had happened (native engine).
     """
     require_choice("engine", engine, ENGINES)
     require_inputs(inputs)

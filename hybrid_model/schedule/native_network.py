@@ -113,6 +113,8 @@ def _run_once(
     except StiffPart:
         store.discard()
         raise
+    except KeyboardInterrupt:
+        raise InterruptedNetwork(NetworkEvents.of_columns(store.columns(), **table.about)) from None
     finally:
         store.close()
     columns = store.columns()
@@ -138,6 +140,20 @@ def _run_once(
         lambda: NetworkEvents.of_columns(columns, **table.about),
         lambda name: table.values_of(ends, name),
     )
+
+
+class InterruptedNetwork(KeyboardInterrupt):
+    """A run of a network that was interrupted from outside.
+
+    Attributes
+    ----------
+    events : NetworkEvents
+        What had happened.
+    """
+
+    def __init__(self, events: NetworkEvents) -> None:
+        super().__init__(f"interrupted after {len(events)} events, which are the exception's `events`")
+        self.events = events
 
 
 class StiffPart(Exception):

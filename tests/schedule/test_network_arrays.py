@@ -10,7 +10,7 @@ import pytest
 import scipy.sparse as sp
 
 import hybrid_model as hm
-from hybrid_model.schedule import event_store
+from hybrid_model.schedule import event_store, native_network
 
 END = 3.0
 
@@ -178,6 +178,24 @@ def test_a_run_that_is_killed_leaves_what_it_has(tmp_path):
     plain = hm.simulate_network(path_of_four(), END, engine="native", solver=hm.Solver(max_step=1e-3)).events
     both = min(len(events), len(plain))
     np.testing.assert_array_equal(events.t[:both], plain.t[:both])
+
+
+def test_an_interrupt_brings_what_had_happened(monkeypatch):
+    plain = hm.simulate_network(path_of_four(), END, engine="native").events
+    monkeypatch.setattr(native_network, "EVENTS_AT_ONCE", 20)
+    noted = native_network.Progress.note
+
+    def note(self, t, events):
+        noted(self, t, events)
+        if t > 0.5 * END / 3.0:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(native_network.Progress, "note", note)
+    with pytest.raises(KeyboardInterrupt, match="interrupted after") as stopped:
+        hm.simulate_network(path_of_four(), END, engine="native")
+    found = stopped.value.events
+    assert 5 < len(found) < len(plain)
+    np.testing.assert_array_equal(found.t, plain.t[: len(found)])
 
 
 def test_a_folder_without_events_is_refused(tmp_path):
