@@ -67,17 +67,22 @@ def tuned_value(variable: Variable, given: npt.ArrayLike, what: str = "parameter
         holds whole numbers.
     """
     value = start_array(f"{what} {variable.name}", given)
-    told = f"{what} {variable.name} is set to {given!r}"
+
+    def told() -> str:
+        # Not before it is wanted: texts of arrays take longer than all the rest.
+        return f"{what} {variable.name} is set to {given!r}"
+
     if value.shape not in ((), variable.shape):
         raise DeclarationError(
-            f"{told}, of shape {value.shape}: give one number for all elements, or an array of shape {variable.shape}."
+            f"{told()}, of shape {value.shape}: give one number for all elements, or an array of shape "
+            f"{variable.shape}."
         )
     low = -np.inf if variable.minimum is None else variable.minimum
     high = np.inf if variable.maximum is None else variable.maximum
     if not (low <= value).all() or not (value <= high).all():
-        raise DeclarationError(f"{told}, outside its range from {low:g} to {high:g}: give a value within it.")
+        raise DeclarationError(f"{told()}, outside its range from {low:g} to {high:g}: give a value within it.")
     if variable.integer and (value != np.round(value)).any():
-        raise DeclarationError(f"{told}, but it holds whole numbers: round it.")
+        raise DeclarationError(f"{told()}, but it holds whole numbers: round it.")
     return np.full(variable.size, value) if value.shape == () else value.ravel()
 
 

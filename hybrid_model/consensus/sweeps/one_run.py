@@ -16,12 +16,15 @@ from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.components import connected_components, union_time
 from hybrid_model.consensus.certificates.forms import BOUNDS, Evidence, Form
 from hybrid_model.consensus.certificates.observation import observe
+from hybrid_model.consensus.certificates.sizes import LARGE
+from hybrid_model.consensus.laws.agent_network import agent_network
 from hybrid_model.consensus.laws.loop_reuse import LoopReuse
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.runs.communication import communication, gap_statistics
 from hybrid_model.consensus.runs.metrics import performance, run_states
-from hybrid_model.consensus.runs.report import run_report
+from hybrid_model.consensus.runs.report import report_of
 from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 from hybrid_model.consensus.sweeps.errors import SweepError
 from hybrid_model.consensus.sweeps.study import Frame
 
@@ -65,15 +68,20 @@ class Runner:
 
     def _measured(self, values: Mapping[str, Any]) -> Row:
         scenario = self._frame.scenario(values)
-        loop, starts = self._loops.loop(scenario)
         zeno = hm.ZenoGuard(max_jumps=self._frame.max_jumps)
-        arc = hm.simulate(loop, scenario.stop_time, starts=starts, zeno=zeno)
+        arc: hm.HybridArc | hm.NetworkRun
+        if scenario.network.agents >= LARGE and scenario.trigger.kind is not TriggerKind.CONTINUOUS:
+            # Event by event: an event of one automaton of all agents would stop all of them.
+            arc = hm.simulate_network(agent_network(scenario), scenario.stop_time, zeno=zeno)
+        else:
+            loop, starts = self._loops.loop(scenario)
+            arc = hm.simulate(loop, scenario.stop_time, starts=starts, zeno=zeno)
         row = _metrics(scenario, arc)
         if self._frame.bounds:
             row |= self._bounds(scenario, arc)
         return row
 
-    def _bounds(self, scenario: Scenario, arc: hm.HybridArc) -> Row:
+    def _bounds(self, scenario: Scenario, arc: hm.HybridArc | hm.NetworkRun) -> Row:
         analysis = self._analysis(scenario)
         if analysis is None:
             return {}
@@ -102,9 +110,9 @@ class Runner:
         return found
 
 
-def _metrics(scenario: Scenario, arc: hm.HybridArc) -> Row:
-    report = run_report(scenario, arc)
-    end = float(arc.t[-1])
+def _metrics(scenario: Scenario, arc: hm.HybridArc | hm.NetworkRun) -> Row:
+    report = report_of(scenario, arc)
+    end = float(arc.t if isinstance(arc, hm.NetworkRun) else arc.t[-1])
     ran = replace(scenario, stop_time=end) if end < scenario.stop_time else scenario
     sent, gaps = communication(ran, report.event_times), gap_statistics(report.event_times)
     judged = performance(ran, run_states(ran, arc), report.event_times)

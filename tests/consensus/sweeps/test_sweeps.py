@@ -18,7 +18,10 @@ import pytest
 from small_scenario import small_scenario
 
 import hybrid_model as hm
-from hybrid_model.consensus import certify, closed_loop, load_scenario, run_metrics, run_report
+from hybrid_model.consensus import closed_loop, load_scenario, run_metrics, run_report
+from hybrid_model.consensus.certificates.analysis import analyse
+from hybrid_model.consensus.certificates.bounds import Bounds
+from hybrid_model.consensus.certificates.observation import observe
 from hybrid_model.consensus.sweeps import execute
 from hybrid_model.consensus.sweeps.errors import SweepError
 from hybrid_model.consensus.sweeps.execute import run_sweep
@@ -95,9 +98,10 @@ def test_a_row_holds_what_a_run_by_itself_shows(tmp_path):
     assert (row["edge_norm_end"], row["mean_drift"]) == (report.edge_norm_end, report.mean_drift)
     assert (row["end"], row["stop"], row["failure"]) == (50.0, "HORIZON", None)
     # The bounds of a network are computed once; those of other thresholds and start values follow from them.
-    bounds = certify(scenario, arc)
-    for name in given.frame.bounds:
-        assert row[name] == pytest.approx(bounds.value(*name.split(".")), rel=1e-9), name
+    bounds = Bounds(analyse(scenario))
+    seen = observe(bounds.analysis, arc, 0.01)
+    expected = (bounds.energy_radius, bounds.printed.rate, seen.radius, seen.min_gap)
+    assert [row[name] for name in given.frame.bounds] == pytest.approx(expected, rel=1e-9)
 
 
 def test_runs_that_fail_say_why_and_the_others_go_on(many, expected):
@@ -107,6 +111,29 @@ def test_runs_that_fail_say_why_and_the_others_go_on(many, expected):
     assert "[trigger] threshold is 0.0; it must be positive." in failed[0][-1]
     events = many.columns.index("events") + 1
     assert min(row[events] for row in expected if row[-1] is None) >= 1
+
+
+def test_large_networks_run_event_by_event(tmp_path):
+    edges = [[k, k % 18 + 1] for k in range(1, 19)]
+    path = tmp_path / "ring.toml"
+    path.write_text(
+        f'name = "ring"\nstop_time = 4.0\n[network]\nagents = 18\nedges = {edges}\n'
+        f"initial = {[k % 5 for k in range(18)]}\n"
+        '[weights]\nkind = "constant"\nvalue = 1.0\n[trigger]\nkind = "static"\nthreshold = 0.3\n'
+    )
+    given = study(path, ["trigger.threshold=0.2,0.4"], bounds=["radius.energy", "radius.observed"])
+    with run_sweep(given, tmp_path / "a.sqlite", executor=ThreadPoolExecutor(1)) as table:
+        rows = [dict(zip(("run", *given.columns), row, strict=True)) for row in table.rows()]
+    for row in rows:
+        scenario = given.frame.scenario({"trigger.threshold": row["trigger.threshold"]})
+        # The whole as one automaton: another engine's times of events, to some 1e-12 of the run.
+        arc = hm.simulate(closed_loop(scenario), 4.0)
+        found = run_metrics(scenario, arc)
+        assert row["failure"] is None
+        assert row["events"] == sum(found["broadcasts"])
+        assert row["gap_min"] == pytest.approx(found["gaps"]["min"], rel=1e-8)
+        assert row["integral"] == pytest.approx(found["integral"], rel=1e-8)
+        assert row["radius.observed"] <= row["radius.energy"]
 
 
 def test_thresholds_that_vanish_too_fast_end_the_run_and_say_so(small, tmp_path):
@@ -302,6 +329,23 @@ def test_dask_gives_the_same_table(many, expected, tmp_path):
     ) as cluster:
         assert cluster.scheduler_address.startswith("tcp://127.0.0.1:")
         assert rows_of(many, tmp_path / "a.sqlite", scheduler=cluster.scheduler_address) == expected
+
+
+@pytest.mark.long
+def test_dask_gives_the_same_table_after_a_worker_was_killed(many, expected, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    own = {"host": "127.0.0.1", "protocol": "tcp://", "dashboard_address": "127.0.0.1:0"}
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, silence_logs=50, **own) as cluster:
+        with distributed.Client(cluster) as client:
+            pids = list(client.run(os.getpid).values())
+
+        def kill_one(done, total):
+            if done and pids:
+                os.kill(pids.pop(), signal.SIGKILL)
+                pids.clear()
+
+        assert rows_of(many, tmp_path / "a.sqlite", scheduler=cluster.scheduler_address, progress=kill_one) == expected
+        assert not pids
 
 
 def test_a_scheduler_that_does_not_answer_is_said_to_be_so(many, tmp_path):
