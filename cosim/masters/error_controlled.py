@@ -22,7 +22,7 @@ from hybrid_model.schedule.scheduler import Event
 
 TOLERANCE = 1e-9
 """Error of a macro step, as a part of the largest value that each signal has had."""
-RESOLUTION = 1e-12
+RESOLUTION = 1e-13
 """Of times of events, as a part of the run."""
 AT_ONE_TIME = 100
 """Instants with events in a row, without a step between them, at most."""

@@ -22,7 +22,7 @@ from hybrid_model.models.sampled_lti_loop import LtiPlant
 from hybrid_model.schedule.blocks import Step
 
 TIME = 1e-7
-"""Of events, in s: what is promised. Steps are halved to 1e-12 of the run, and the tolerance of a step is 1e-9."""
+"""Of events, in s: what is promised. Steps are halved to 1e-13 of the run, and the tolerance of a step is 1e-9."""
 ON_A_BALL = {"second.table": "first.h", "second.table_velocity": "first.v"}
 
 

@@ -1,12 +1,18 @@
 """Wiring is checked before anything runs, and refused with both names."""
 
+from dataclasses import replace
+
 import pytest
 
 import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.errors import MisfitError
-from cosim.masters import run_event_exact
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_event_exact, run_fixed_step
+from cosim.slave import Measure
 from cosim.system import System
+from fmu.export import export_fmu
+from hybrid_model.models import BouncingBall
 
 
 class Sender(hm.HybridAutomaton):
@@ -28,6 +34,14 @@ class Receiver(hm.HybridAutomaton):
     gain2 = hm.Input(0.0)
     many = hm.Input([0.0, 0.0], discrete=True)
     table = hm.Input([[0.0, 0.0]], discrete=True)
+
+
+class Receives(hm.HybridAutomaton):
+    u = hm.Input(0.0, discrete=True)
+    y = hm.Output()
+
+    def outputs(self, s):
+        return {"y": s.u}
 
 
 def wire(connections):
@@ -104,3 +118,44 @@ def test_event_exact_master_refuses_a_signal_that_changes_along_flows():
         MisfitError, match=r"sender.position -> receiver.felt carries a signal that changes along flows"
     ):
         run_event_exact(wire({"receiver.felt": "sender.position"}), 1.0)
+
+
+def measured(slave, unit, measure):
+    """Give all ports of a slave a unit, as an FMU may declare it."""
+    slave.outputs = {name: replace(port, unit=unit, measure=measure) for name, port in slave.outputs.items()}
+    slave.inputs = {name: replace(port, unit=unit, measure=measure) for name, port in slave.inputs.items()}
+    return slave
+
+
+CELSIUS, KELVIN = Measure((0, 0, 0, 0, 1, 0, 0, 0), 1.0, 273.15), Measure((0, 0, 0, 0, 1, 0, 0, 0))
+FAHRENHEIT = Measure((0, 0, 0, 0, 1, 0, 0, 0), 5.0 / 9.0, 273.15 - 32.0 * 5.0 / 9.0)
+METRE = Measure((0, 1, 0, 0, 0, 0, 0, 0))
+
+
+@pytest.mark.parametrize("master", [run_event_exact, lambda system, t: run_fixed_step(system, t, 0.5)])
+@pytest.mark.parametrize(
+    ("from_", "into", "arrives"), [(CELSIUS, KELVIN, 374.15), (KELVIN, CELSIUS, -172.15), (CELSIUS, FAHRENHEIT, 213.8)]
+)
+def test_units_that_both_sides_declare_are_converted(from_, into, arrives, master):
+    """101 degrees of each kind; the number changes at the start and in a step alike."""
+    sender = measured(AutomatonSlave("sender", Sender(sent=101.0)), "from", from_)
+    receiver = measured(AutomatonSlave("receiver", Receives()), "into", into)
+    result = master(System([sender, receiver], {"receiver.u": "sender.sent"}), 1.0)
+    assert result.final["receiver.y"] == pytest.approx(arrives, rel=1e-14)
+
+
+def test_units_that_measure_differently_are_refused():
+    slaves = [measured(AutomatonSlave("sender", Sender()), "degC", CELSIUS)]
+    slaves.append(measured(AutomatonSlave("receiver", Receives()), "m", METRE))
+    with pytest.raises(MisfitError, match=r"is in 'degC', but receiver\.u is in 'm', and they measure differently"):
+        System(slaves, {"receiver.u": "sender.sent"})
+    measured(slaves[1], "K", None)
+    with pytest.raises(MisfitError, match="both are not declared in SI base units"):
+        System(slaves, {"receiver.u": "sender.sent"})
+
+
+def test_measures_of_fmus_are_those_that_they_declare(tmp_path):
+    path = export_fmu(BouncingBall(), tmp_path / "ball.fmu", kinds=("cs",))
+    ports = FmuSlave("ball", path).outputs
+    assert ports["h"].measure == METRE
+    assert ports["v"].measure == Measure((0, 1, -1, 0, 0, 0, 0, 0))
