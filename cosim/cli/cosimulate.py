@@ -59,6 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--interface", choices=INTERFACES, help="of FMUs that have both; default: cs, Co-Simulation; me: Model Exchange"
     )
+    parser.add_argument(
+        "--fmi", choices=("2.0", "3.0"), default="3.0", help="version of the FMUs that are made of a scenario"
+    )
     parser.add_argument("--tolerance", type=float, help="of the error-controlled master: of each step; default: 1e-9")
     parser.add_argument(
         "--order", choices=ORDERS, default=ORDERS[0], help="of the fixed-step master, see docs/cosimulation.md"
@@ -122,7 +125,7 @@ def run(options: argparse.Namespace) -> int:
             if options.step_study is not None:
                 print(*study(scenario, options.step_study), sep="\n")
                 return int(Exit.DONE)
-            system, experiment = _agents(scenario, folder), Experiment(stop_time=scenario.stop_time)
+            system, experiment = _agents(scenario, folder, options.fmi), Experiment(stop_time=scenario.stop_time)
             fmus = [Component(name, FMU, str(folder / f"{name}.fmu")) for name in system.slaves]
             definition = SystemDefinition(scenario.name, fmus, broadcast_wires(scenario))
         else:
@@ -178,11 +181,11 @@ def _completed(options: argparse.Namespace, system: System, file: Experiment) ->
     )
 
 
-def _agents(scenario: Scenario, folder: Path) -> System:
+def _agents(scenario: Scenario, folder: Path, fmi: str) -> System:
     fmus = {}
     for name, automaton in scenario_agents(scenario).items():
         progress(f"exporting {name}")
-        fmus[name] = export_fmu(automaton, folder / f"{name}.fmu")
+        fmus[name] = export_fmu(automaton, folder / f"{name}.fmu", fmi=fmi)
     return fmu_system(scenario, fmus)
 
 

@@ -69,6 +69,7 @@ def write_osp(definition: SystemDefinition, system: System, folder: str | Path, 
     root = etree.Element(f"{{{OSP}}}OspSystemStructure", nsmap={None: OSP}, version="0.1")
     _add(root, OSP, "StartTime").text = repr(definition.experiment.start_time or 0.0)
     _add(root, OSP, "BaseStepSize").text = repr(step)
+    _add(root, OSP, "Algorithm").text = "fixedStep"
     simulators = _add(root, OSP, "Simulators")
     for (name, source), component in zip(_fmus(definition), definition.components, strict=True):
         shutil.copyfile(source, folder / f"{name}.fmu")
