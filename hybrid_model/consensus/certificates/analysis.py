@@ -26,7 +26,7 @@ from hybrid_model.consensus.certificates.sizes import (
 from hybrid_model.consensus.certificates.tree_bound import default_window
 from hybrid_model.consensus.certificates.windows import RateForm, best_window
 from hybrid_model.consensus.exact.floquet import FloquetSpectrum, floquet_spectrum
-from hybrid_model.consensus.exact.free_motion import CellMotion, ConstantMotion, SparseMotion
+from hybrid_model.consensus.exact.free_motion import CellMotion, ConstantMotion, SparseMotion, leading_multipliers
 from hybrid_model.consensus.exact.reachable_sets import ReachableSets
 from hybrid_model.consensus.exact.transition_grid import TransitionGrid, affordable_resolution, transition_grid
 from hybrid_model.consensus.exact.worst_case import WorstCase, worst_case
@@ -42,6 +42,8 @@ PATIENCE = 5.0
 
 _CELLS_MEMORY = 2**28
 """In bytes."""
+_LEAST_MULTIPLIER = 1e-5
+"""Below, digits are lost."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,8 +152,24 @@ class Analysis:
 
     @cached_property
     def spectrum(self) -> FloquetSpectrum | None:
-        """Floquet multipliers; None without a period."""
-        return floquet_spectrum(self.scenario) if self.is_periodic else None
+        """Floquet multipliers; None without a period.
+
+        Of large networks whose edges carry weights of different shape at one time, only the largest ones: the monodromy
+        matrix would take too long.
+        """
+        if not self.is_periodic:
+            return None
+        if self.is_large and not self.is_constant and not self._has_shared_carriers:
+            multipliers = leading_multipliers(self.motion, self.scenario.network.agents)
+            largest = float(np.abs(multipliers[0]))
+            if largest > _LEAST_MULTIPLIER:
+                return FloquetSpectrum(self.cycle, multipliers, -math.log(largest) / self.cycle)
+        return floquet_spectrum(self.scenario)
+
+    @property
+    def _has_shared_carriers(self) -> bool:
+        pieces = self.scenario.edge_weights.pieces(0.0, self.cycle)
+        return all(piece.is_idle or piece.shared_carrier is not None for piece in pieces)
 
     @cached_property
     def cycle(self) -> float:

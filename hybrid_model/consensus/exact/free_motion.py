@@ -12,13 +12,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.linalg import LinearOperator, eigs
 
 from hybrid_model.consensus.exact.transition_grid import TransitionGrid
 from hybrid_model.consensus.graphs.undirected import disagreement_basis
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.weights.edge_weights import Piece
 
-__all__ = ["CellMotion", "ConstantMotion", "SparseMotion"]
+__all__ = ["CellMotion", "ConstantMotion", "SparseMotion", "leading_multipliers"]
 
 _GROWTH = 0.01
 """``beta`` times the length of a cell."""
@@ -46,7 +47,7 @@ class ConstantMotion:
     def __init__(self, scenario: Scenario) -> None:
         network = scenario.network
         weights = scenario.edge_weights.value(0.0)
-        rates, vectors = np.linalg.eigh(network.gain * _laplacian(scenario, weights).toarray())
+        rates, vectors = np.linalg.eigh(network.gain * _laplacian(_sparse_incidence(scenario), weights).toarray())
         self.rates, self._vectors = np.maximum(rates[1:], 0.0), vectors[:, 1:]
         self._shares = self._vectors.T @ np.asarray(network.initial)
         self._mean = float(np.mean(network.initial))
@@ -153,7 +154,7 @@ class SparseMotion:
         """The exponents of the Magnus series of each cell; None where nothing moves."""
         if piece.is_idle:
             return [None] * (len(times) - 1)
-        first = [-self._gain * _laplacian(self._scenario, row) for row in dose]
+        first = [-self._gain * _laplacian(self._incidence, row) for row in dose]
         if piece.shared_carrier is not None:
             return list(first)
         lengths = np.diff(times)
@@ -161,7 +162,7 @@ class SparseMotion:
         early, late = (self._values(piece, middle + sign * offset) for sign in (-1, 1))
         steps: list[sparse.csr_array | None] = []
         for k, exponent in enumerate(first):
-            a, b = (_laplacian(self._scenario, row) for row in (early[k], late[k]))
+            a, b = (_laplacian(self._incidence, row) for row in (early[k], late[k]))
             steps.append(exponent + self._gain**2 * math.sqrt(3.0) / 12 * lengths[k] ** 2 * (b @ a - a @ b))
         return steps
 
@@ -221,6 +222,35 @@ class CellMotion:
         return self._cells.product()
 
 
+def leading_multipliers(motion: SparseMotion | CellMotion, agents: int, count: int = 4) -> NDArray[np.complex128]:
+    """The largest Floquet multipliers of a motion over its cycle, largest modulus first, by Arnoldi's method.
+
+    Parameters
+    ----------
+    motion : SparseMotion or CellMotion
+        Over one period.
+    agents : int
+        n.
+    count : int
+        How many are wanted.
+
+    Raises
+    ------
+    scipy.sparse.linalg.ArpackNoConvergence
+        If they lie so close together that they are not found.
+    """
+
+    def cycle(state: NDArray[np.float64]) -> NDArray[np.float64]:
+        # Without its mean, which never changes and would be a multiplier of one.
+        free = state - state.mean()
+        return np.asarray(motion.over_a_cycle(free))
+
+    operator = LinearOperator((agents, agents), matvec=cycle, dtype=np.float64)
+    start = np.random.default_rng(agents).standard_normal(agents)
+    found = eigs(operator, k=min(count, agents - 2), which="LM", v0=start, return_eigenvectors=False)
+    return np.asarray(found[np.argsort(-np.abs(found))], dtype=np.complex128)
+
+
 def _moved(step: sparse.csr_array | None, state: NDArray[np.float64]) -> NDArray[np.float64]:
     """``exp(step) state`` by its series: a step is small."""
     if step is None:
@@ -242,6 +272,5 @@ def _sparse_incidence(scenario: Scenario) -> sparse.csr_array:
     return sparse.csr_array(entries, shape=(scenario.network.agents, len(edges)))
 
 
-def _laplacian(scenario: Scenario, weights: NDArray[np.float64]) -> sparse.csr_array:
-    D = _sparse_incidence(scenario)
+def _laplacian(D: sparse.csr_array, weights: NDArray[np.float64]) -> sparse.csr_array:
     return sparse.csr_array(D @ sparse.diags_array(weights) @ D.T)

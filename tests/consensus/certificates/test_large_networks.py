@@ -14,7 +14,8 @@ from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.energy import initial_peaks
 from hybrid_model.consensus.certificates.observation import undisturbed
 from hybrid_model.consensus.certificates.sizes import LARGE, Cost, trees_cost, worst_case_cost
-from hybrid_model.consensus.exact.free_motion import ConstantMotion, SparseMotion
+from hybrid_model.consensus.exact.floquet import floquet_spectrum
+from hybrid_model.consensus.exact.free_motion import CellMotion, ConstantMotion, SparseMotion, leading_multipliers
 from hybrid_model.consensus.exact.transition_grid import transition_grid
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, incidence, weighted_laplacian
 from hybrid_model.consensus.messages import enumerated
@@ -67,6 +68,22 @@ def test_states_from_cell_to_cell_are_those_of_transition_matrices(wave):
     # Both are Magnus series of the fourth order where edges have different shapes.
     assert motion.over_a_cycle(start, 2) == pytest.approx(expected, abs=1e-13 if wave == "gated" else 1e-8)
     assert motion.path(start)[-1] == pytest.approx(motion.over_a_cycle(start), abs=1e-14)
+
+
+@pytest.mark.parametrize("wave", ["gated", "different"])
+def test_the_largest_multipliers_are_those_of_the_monodromy_matrix(wave):
+    scenario = network(16, wave)
+    period = scenario.edge_weights.period
+    cells = transition_grid(scenario, 0.0, period, 0.02)
+    expected = np.sort(np.abs(np.linalg.eigvals(cells.product())))[::-1][:4]
+    # Without matrices a period takes long where edges of different shape make many cells.
+    motion = SparseMotion(scenario, period) if wave == "gated" else CellMotion(scenario, cells)
+    assert np.abs(leading_multipliers(motion, 16)) == pytest.approx(expected, rel=1e-10)
+
+
+def test_the_rate_of_weights_of_different_shape_needs_no_monodromy_matrix():
+    scenario = network(16, "different")
+    assert analyse(scenario).spectrum.rate == pytest.approx(floquet_spectrum(scenario).rate, rel=1e-7)
 
 
 @pytest.mark.parametrize("wave", ["constant", "gated"])
