@@ -75,7 +75,7 @@ def test_the_page_names_all_columns_and_all_options():
     assert {option for option in options if option not in PAGE} <= {"--max-jumps", "--table"}
     assert [name for name in METRICS if f"`{name}`" not in PAGE] == []
     axes = [line.split("`")[1] for line in PAGE.splitlines() if line.startswith("| `") and "=" in line.split("`")[1]]
-    assert len(axes) == 5
+    assert len(axes) == 6
     assert all(read_axis(axis) for axis in axes)
 
 

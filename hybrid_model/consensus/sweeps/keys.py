@@ -1,4 +1,7 @@
-"""The keys of a scenario file by name, ``trigger.decay`` or ``network.initial[2]``, and other values under them."""
+"""The keys of a scenario file by name, ``trigger.decay`` or ``network.initial[2]``, and other values under them.
+
+A key in a table of a table is ``network.initial.seed``.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from hybrid_model.consensus.sweeps.errors import SweepError
 
 __all__ = ["Key", "with_values"]
 
-_FORM = re.compile(r"(?:(?P<table>[a-z_]+)\.)?(?P<key>[a-z_]+)(?P<places>(?:\[[0-9]+\])*)")
+_FORM = re.compile(r"(?P<path>[a-z_]+(?:\.[a-z_]+)*)(?P<places>(?:\[[0-9]+\])*)")
 
 
 @dataclass(frozen=True)
@@ -20,16 +23,13 @@ class Key:
 
     Attributes
     ----------
-    table : str
-        Its table; empty for a key in front of all tables.
-    key : str
-        Its name.
+    path : tuple of str
+        Names of the tables around it, and its own.
     places : tuple of int
         Where in its list, and in the lists there, counted from 1.
     """
 
-    table: str
-    key: str
+    path: tuple[str, ...]
     places: tuple[int, ...]
 
     @classmethod
@@ -48,7 +48,7 @@ class Key:
                 "element of a list, counted from 1."
             )
         places = tuple(int(place) for place in re.findall("[0-9]+", found["places"]))
-        return cls(found["table"] or "", found["key"], places)
+        return cls(tuple(found["path"].split(".")), places)
 
 
 def with_values(entries: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -66,16 +66,18 @@ def with_values(entries: Mapping[str, Any], values: Mapping[str, Any]) -> dict[s
     SweepError
         If a key is none, or names an element that is not there.
     """
-    changed = {name: dict(entry) if isinstance(entry, dict) else entry for name, entry in entries.items()}
+    changed = dict(entries)
     for text, value in sorted(values.items(), key=lambda item: item[0].count("[")):
         key = Key.read(text)
-        table: Any = changed.setdefault(key.table, {}) if key.table else changed
-        if not isinstance(table, dict):
-            raise SweepError(f"'{text}' names an entry of {key.table}, which is no table in this scenario.")
-        if not key.places:
-            table[key.key] = value
-            continue
-        table[key.key] = _replaced(text, table.get(key.key), key.places, value)
+        *tables, name = key.path
+        place: dict[str, Any] = changed
+        for table in tables:
+            inner = place.get(table, {})
+            if not isinstance(inner, dict):
+                raise SweepError(f"'{text}' names an entry of {table}, which is no table in this scenario.")
+            # Copied on the way: the entries that were given stay as they are.
+            place[table] = place = dict(inner)
+        place[name] = _replaced(text, place.get(name), key.places, value) if key.places else value
     return changed
 
 

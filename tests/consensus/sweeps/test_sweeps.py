@@ -113,6 +113,26 @@ def test_runs_that_fail_say_why_and_the_others_go_on(many, expected):
     assert min(row[events] for row in expected if row[-1] is None) >= 1
 
 
+def test_graphs_and_seeds_vary_as_any_other_key(tmp_path):
+    path = tmp_path / "drawn.toml"
+    path.write_text(
+        'name = "drawn"\nstop_time = 2.0\n[network]\nagents = 8\ngraph = "ring"\ndegree = 4\n'
+        'initial = {draw = "normal", mean = 0.0, deviation = 1.0, seed = 1}\n'
+        '[weights]\nkind = "constant"\nvalue = 1.0\n[trigger]\nkind = "static"\nthreshold = 0.3\n'
+    )
+    given = study(
+        path, ["network.graph=ring,small-world", "network.seed=seeds", "network.initial.seed=seeds"], repeats=2, seed=4
+    )
+    with run_sweep(given, tmp_path / "a.sqlite", executor=ThreadPoolExecutor(1)) as table:
+        assert table.failures == 0
+        assert table.column("network.graph").tolist() == ["ring", "ring", "small-world", "small-world"]
+        assert len(set(table.column("integral"))) == 4
+    edges = [given.frame.scenario(given.values(run)).network.edges for run in range(4)]
+    assert edges[0] == edges[1]
+    assert [len(each) for each in edges[2:]] == [16, 16]
+    assert edges[2] != edges[3]
+
+
 def test_large_networks_run_event_by_event(tmp_path):
     edges = [[k, k % 18 + 1] for k in range(1, 19)]
     path = tmp_path / "ring.toml"
