@@ -67,8 +67,10 @@ class CosimResult:
     def keep(self, t: float, names: Sequence[str], values: Sequence[Any]) -> None:
         """Append a row: the named outputs at `t` in s."""
         self.times.append(t)
+        if not self.signals:
+            self.signals.update((name, []) for name in names)
         for name, value in zip(names, values, strict=True):
-            self.signals.setdefault(name, []).append(value)
+            self.signals[name].append(value)
         if self.watch is not None:
             self.watch(self)
 
