@@ -10,6 +10,8 @@ from typing import Any
 from cosim.errors import MisfitError
 from cosim.slave import Port, Slave
 
+SETTLED = 1e-14
+"""Part of a signal by which it may change and still have settled in a loop that is iterated."""
 _TYPES = {
     ("number", False): "numbers",
     ("number", True): "whole numbers",
@@ -53,6 +55,9 @@ class System:
     connections : mapping
         ``"slave.input"`` -> ``"slave.output"``; for vectors too, if both have the same elements, or to a sequence of
         names for the elements. Inputs not named keep their start values.
+    loop_iterations : int
+        How often signals that depend on each other at once, in a loop, are carried round it until they settle, beyond
+        what a chain of all slaves needs. That solves loops whose gain is below one in size; 0: loops are refused.
 
     Raises
     ------
@@ -61,7 +66,10 @@ class System:
         input, or text on an input for numbers.
     """
 
-    def __init__(self, slaves: Sequence[Slave], connections: Mapping[str, str | Sequence[str]]) -> None:
+    def __init__(
+        self, slaves: Sequence[Slave], connections: Mapping[str, str | Sequence[str]], *, loop_iterations: int = 0
+    ) -> None:
+        self.loop_iterations = loop_iterations
         self.slaves = {slave.name: slave for slave in slaves}
         if len(self.slaves) < len(slaves):
             raise MisfitError(f"two slaves have one name among {[slave.name for slave in slaves]}: name them apart.")
@@ -75,6 +83,17 @@ class System:
         self._from: dict[str, list[Connection]] = {name: [] for name in self.slaves}
         for connection in self.connections:
             self._from[connection.source].append(connection)
+
+    @property
+    def most_rounds(self) -> int:
+        """How often signals are carried until they must have settled: a chain of n needs n, and one to see it."""
+        return len(self.slaves) + 1 + self.loop_iterations
+
+    def settled(self, value: Any, before: Any) -> bool:
+        """Return whether a signal has come to rest; in loops that are iterated, to rounding."""
+        if not self.loop_iterations or not isinstance(value, float) or not isinstance(before, float):
+            return bool(value == before)
+        return abs(value - before) <= SETTLED * max(abs(value), abs(before))
 
     def from_slave(self, name: str) -> list[Connection]:
         """Return the connections that start at a slave."""

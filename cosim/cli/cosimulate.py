@@ -105,6 +105,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a scenario: how far its agents with fixed steps are from the event-exact run, a table and a figure",
     )
     parser.add_argument("--ssp-version", choices=VERSIONS, default=VERSIONS[0])
+    parser.add_argument(
+        "--loop-iterations",
+        type=int,
+        default=0,
+        metavar="N",
+        help="carry signals up to N times round loops without states, until they settle; default: loops are refused",
+    )
     parser.add_argument("--isolate", action="store_true", help="run each FMU in a process of its own")
     parser.add_argument(
         "--call-timeout", type=float, default=PATIENCE, metavar="S", help="s that one call of an isolated FMU may take"
@@ -146,7 +153,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _assembled(definition: SystemDefinition, options: argparse.Namespace) -> System:
     return assemble(
-        definition, validate=not options.no_validate, isolate=options.isolate, patience=options.call_timeout
+        definition,
+        validate=not options.no_validate,
+        isolate=options.isolate,
+        patience=options.call_timeout,
+        loop_iterations=options.loop_iterations,
     )
 
 

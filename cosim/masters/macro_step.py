@@ -124,19 +124,20 @@ class MacroSteps:
         """
         self._changes.follow(t)
         before: list[float] | None = None
-        for _ in range(len(self._system.slaves) + 1):
+        system = self._system
+        for _ in range(system.most_rounds):
             values = [c.carried(v) for c, v in zip(self._flows, self._read(), strict=True)]
-            if values == before:
+            if before is not None and all(map(system.settled, values, before)):
                 return values
             for k, (connection, value) in enumerate(zip(self._flows, values, strict=True)):
                 if before is None or before[k] != value:
-                    self._system.slaves[connection.target].set(connection.input, value)
+                    system.slaves[connection.target].set(connection.input, value)
             before = values
         assert before is not None
         changed = next(c for c, a, b in zip(self._flows, before, self._carried(), strict=True) if a != b)
         raise CosimError(
             f"the signals at t = {t:.9g} s do not settle: {changed} and others depend on each other at once, in a "
-            "loop. Break it by a state."
+            "loop. Break it by a state, or have it iterated."
         )
 
     def _carried(self) -> list[float]:

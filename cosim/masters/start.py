@@ -53,13 +53,15 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool 
         slave.start(t_start, t_stop, events=slave.has_event_mode if events is None else events)
     changes.set_start_values()
     known: dict[tuple[str, str], float] = {}
-    # A chain of n slaves needs n rounds, and one more to see that nothing changes.
-    for _ in range(len(system.slaves) + 1):
+    for _ in range(system.most_rounds):
         changed = [c for c in system.connections if transfer_start(system, c, known)]
         if not changed:
             break
     else:
-        raise CosimError(f"the start values do not settle: {changed[0]} and others form a loop. Break it by a state.")
+        raise CosimError(
+            f"the start values do not settle: {changed[0]} and others form a loop. Break it by a state, or have it "
+            "iterated."
+        )
     for slave in system.slaves.values():
         slave.begin()
 
@@ -68,7 +70,7 @@ def transfer_start(system: System, connection: Connection, known: dict[tuple[str
     """Transfer one start value; return whether it was news to the input."""
     target, input_, source, output = connection.target, connection.input, connection.source, connection.output
     value = connection.carried(system.slaves[source].get(output))
-    if known.get((target, input_)) == value:
+    if (target, input_) in known and system.settled(value, known[target, input_]):
         return False
     known[target, input_] = value
     system.slaves[target].set(input_, value)

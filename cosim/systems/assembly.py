@@ -19,7 +19,12 @@ from hybrid_model.named_objects import imports_from
 
 
 def assemble(
-    definition: SystemDefinition, *, validate: bool = True, isolate: bool = False, patience: float = PATIENCE
+    definition: SystemDefinition,
+    *,
+    validate: bool = True,
+    isolate: bool = False,
+    patience: float = PATIENCE,
+    loop_iterations: int = 0,
 ) -> System:
     """Make a system: its slaves with their start values, and its connections.
 
@@ -32,6 +37,8 @@ def assemble(
         Whether to run each FMU in a process of its own.
     patience : float
         Seconds that one call of an isolated FMU may take.
+    loop_iterations : int
+        See `System`.
 
     Raises
     ------
@@ -44,7 +51,7 @@ def assemble(
     for component, slave in zip(definition.components, slaves, strict=True):
         for name, value in component.start.items():
             set_start(slave, name, value)
-    return System(slaves, definition.connections)
+    return System(slaves, definition.connections, loop_iterations=loop_iterations)
 
 
 def set_start(slave: Slave, name: str, value: Any) -> None:

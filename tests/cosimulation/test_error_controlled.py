@@ -137,6 +137,24 @@ def test_signals_that_depend_on_each_other_at_once_are_named():
         run_error_controlled(System(slaves, {"a.u": "b.y", "b.u": "a.y"}), 1.0)
 
 
+def test_a_loop_whose_gain_is_below_one_is_iterated_on_request():
+    """a = b/2 and b = a/2 + x with x' = 1: b = x/(1 - 1/4)."""
+
+    class Adds(Passes):
+        x = hm.Input(0.0)
+
+        def outputs(self, s):
+            return {"y": s.gain * s.u + s.x}
+
+    slaves = [AutomatonSlave("a", Passes(gain=0.5)), AutomatonSlave("b", Adds(gain=0.5))]
+    slaves.append(AutomatonSlave("x", Integrates(u=1.0, x=3.0)))
+    wires = {"a.u": "b.y", "b.u": "a.y", "b.x": "x.x"}
+    result = run_error_controlled(System(slaves, wires, loop_iterations=100), 1.0)
+    assert result.final["b.y"] == pytest.approx(4.0 / 0.75, rel=1e-12)
+    with pytest.raises(CosimError, match="form a loop"):
+        run_error_controlled(System(slaves, wires), 1.0)
+
+
 def test_what_cannot_go_back_is_refused_by_name(stranger):
     system = System([FmuSlave("stranger", stranger(states=False))], {})
     with pytest.raises(MisfitError, match="stranger cannot return to an earlier state"):
