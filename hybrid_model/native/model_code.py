@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
+
+import casadi as ca
 
 from hybrid_model import scales
 from hybrid_model.declare.layout import Layout
@@ -12,7 +15,7 @@ from hybrid_model.native.c_text import array, boolean, constant, definition, fun
 from hybrid_model.native.derivatives import derivative_functions, jacobian_function
 from hybrid_model.native.names import NameTable
 from hybrid_model.native.networks.network import NetworkTrace
-from hybrid_model.native.trace import Trace
+from hybrid_model.native.trace import Trace, changed
 
 
 def model_code(traced: Trace | NetworkTrace) -> str:
@@ -63,11 +66,43 @@ def _maps(traced: Trace | NetworkTrace, *, derivatives: bool, jacobian: bool) ->
     found = {**(derivative_functions(traced) if derivatives else {})}
     if jacobian:
         found["jacobian"] = jacobian_function(traced)
-    given = [*traced.functions, *found.values()]
-    resets = array("ModelFunction", "resets", (reset.name() for reset in traced.resets))
+    resets = [_Reset(reset) for reset in traced.resets]
+    given = [*traced.functions[: -len(resets) or None], *(reset.function for reset in resets), *found.values()]
+    work = [max(getattr(f, size)() for f in given) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
     without = [f"#define hybrid_{name} NULL" for name in _DERIVATIVES if name not in found]
-    code = "\n".join([functions("model", given), '#include "model.h"', "", resets, _RESET, *without])
-    return code, [max(getattr(f, size)() for f in given) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
+    code = "\n".join(
+        [functions("model", given), '#include "model.h"', "", *_resets(traced, resets, work[-1]), *without]
+    )
+    work[-1] += max((len(reset.x) + len(reset.z) for reset in resets), default=0)
+    return code, work
+
+
+class _Reset:
+    """A jump map that gives what it changes alone: the places in x and z, and a function of their new values.
+
+    Most jumps change few of many states. What is not computed need not be compiled.
+    """
+
+    def __init__(self, whole: ca.Function) -> None:
+        self.x, self.z = sorted(changed(whole, Kind.STATE)), sorted(changed(whole, Kind.DISCRETE))
+        arguments = whole.sx_in()
+        x, z = whole.call(arguments)
+        after = [ca.vertcat(ca.SX(0, 1), *(new[k] for k in places)) for new, places in ((x, self.x), (z, self.z))]
+        self.function = ca.Function(whole.name(), arguments, after)
+
+
+def _resets(traced: Trace, resets: Sequence[_Reset], own: int) -> list[str]:
+    """Return the tables of the jump maps and the function that calls them, whose work begins after `own` doubles."""
+    firsts = accumulate((len(reset.x) + len(reset.z) for reset in resets), initial=0)
+    parts = [row(first, len(reset.x), len(reset.z)) for first, reset in zip(firsts, resets, strict=False)]
+    sizes = traced.layout.sizes
+    return [
+        "typedef struct { size_t first, x, z; } ResetPart;",
+        array("ModelFunction", "resets", (reset.function.name() for reset in resets)),
+        array("ResetPart", "reset_parts", parts),
+        array("size_t", "reset_places", (str(place) for reset in resets for place in (*reset.x, *reset.z))),
+        _RESET.format(states=sizes[Kind.STATE], discrete=sizes[Kind.DISCRETE], work=own),
+    ]
 
 
 _DERIVATIVES = ("forward", "reverse", "start_forward", "start_reverse", "jacobian")
@@ -85,10 +120,25 @@ _PRELUDE = """\
 #endif
 """
 _RESET = """\
+/* A jump map writes the states that it changes; the others stay. */
 static int hybrid_reset(size_t jump, const double **arg, double **res, long long *iw, double *w)
-{
-    return resets[jump](arg, res, iw, w, 0);
-}
+{{
+    const ResetPart *part = &reset_parts[jump];
+    const size_t *place = reset_places + part->first;
+    double *x = res[0], *z = res[1], *after = w + {work};
+    for (size_t i = 0; i < {states}; i++)
+        x[i] = arg[1][i];
+    for (size_t i = 0; i < {discrete}; i++)
+        z[i] = arg[2][i];
+    res[0] = after;
+    res[1] = after + part->x;
+    int failed = resets[jump](arg, res, iw, w, 0);
+    for (size_t i = 0; i < part->x; i++)
+        x[place[i]] = after[i];
+    for (size_t i = part->x; i < part->x + part->z; i++)
+        z[place[i]] = after[i];
+    return failed;
+}}
 """
 
 
