@@ -101,8 +101,10 @@ class SweepTable:
 
     def close(self) -> None:
         """Close the file, and leave nothing beside it."""
-        with suppress(sqlite3.Error):
-            self._database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+        # Who only reads must not wait for who writes.
+        if self._lock is not None:
+            with suppress(sqlite3.Error):
+                self._database.execute("PRAGMA wal_checkpoint(TRUNCATE)")
         self._database.close()
         if self._lock is not None:
             self._lock.close()
