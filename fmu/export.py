@@ -60,7 +60,7 @@ def export_fmu(
         Platforms that it is to run on, named as in FMI 3.0, such as ``x86_64-linux``; this machine's if not given.
     stop_time, step_size : float, optional
         Default stop time and communication step in s that the description proposes. With a stop time the archive holds
-        the results of a run in Python up to it, except for large networks
+        the results of a run up to it, except for large networks
         (`hybrid_model.native.networks.network.worth_looping`). Without a step
         it proposes a round share of the stop time, else of the fastest time or rate among the parameters.
     sources : bool

@@ -1,4 +1,4 @@
-"""Reference results: a run of the automaton in Python, to compare an FMU's run with.
+"""Reference results: a run of the automaton itself, to compare an FMU's run with.
 
 They lie where the layered standard for related files (FMI-LS-REF 1.0.0-beta.1) has them, with an experiment in the form
 of the Modelica Association's harmonized specification (MA-HS-Experiments) and results as comma-separated values.
@@ -27,7 +27,7 @@ NOTE = "documentation/fmi-ls-ref.txt"
 _NOTE = """Reference results of {name}
 
 The experiment starts at 0 s and ends at {end} s, with all start values, parameters and inputs as the model description
-has them. The results come from a run of the automaton in Python (hybrid-fmu), by another integrator than the FMU's.
+has them. The results come from a run of the automaton itself (hybrid_model.simulate), recorded by the exporter.
 Values are rounded to {digits} digits of the greatest in their column. The instant of a jump has two rows, before its
 first and after its last jump there: an importer without event mode has only the second, and that at its next
 communication point. To be expected: the same jumps, times equal to 1e-7 s, continuous states to 1e-8 of their size.
@@ -73,7 +73,7 @@ def reference_results(description: Description, stop_time: float) -> dict[str, b
             "experiment/smoke-test",
             "a run of the model",
         ),
-        "results.csv": (results, "text/csv", "result", "its results, from a run of the automaton in Python"),
+        "results.csv": (results, "text/csv", "result", "its results, from a run of the automaton itself"),
     }
     members = {name: content for name, (content, *_) in related.items()}
     members["fmi-ls-manifest.xml"] = _manifest(related)
