@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "chebyshev.h"
 #include "method.h"
 
 /* A full matrix of more rows costs more than it spares, unless the author wishes it. */
@@ -23,16 +24,16 @@ static void *take(Cursor *cursor, size_t size)
 
 static size_t point_length(const Model *m)
 {
-    return 2 + m->n_states + m->n_discrete + m->n_margins + 1 + m->n_states + N_PROGRESS;
+    return 3 + m->n_states + m->n_discrete + m->n_margins + 1 + m->n_states + N_PROGRESS;
 }
 
 static Point take_point(Cursor *cursor, const Model *m)
 {
     double *values = take(cursor, point_length(m) * sizeof(double));
     if (!values)
-        return (Point){NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    double *x = values + 2, *z = x + m->n_states, *level = z + m->n_discrete, *size = level + m->n_margins + 1;
-    return (Point){values, values + 1, x, z, level, size, size + m->n_states};
+        return (Point){NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    double *x = values + 3, *z = x + m->n_states, *level = z + m->n_discrete, *size = level + m->n_margins + 1;
+    return (Point){values, values + 1, values + 2, x, z, level, size, size + m->n_states};
 }
 
 /* Lays out the block; called once with no memory, to learn the size. */
@@ -60,7 +61,7 @@ size_t engine_seed_count(const Model *m)
 
 bool engine_may_show_stiffness(const Model *m)
 {
-    return m->stiffness == STIFFNESS_UNKNOWN && m->n_states <= MOST_STATES_TO_SHOW;
+    return m->stiffness == STIFFNESS_UNKNOWN && m->quadratures == 0 && m->n_states <= MOST_STATES_TO_SHOW;
 }
 
 /* What a method for stiff flows needs, where the model has derivatives for it. */
@@ -70,7 +71,7 @@ static void lay_out_implicit(Engine *engine, Cursor *cursor)
     size_t n = m->n_states, vector = n * sizeof(double);
     Implicit *of = &engine->implicit;
     bool wanted = m->stiffness == STIFFNESS_DECLARED || engine_may_show_stiffness(m);
-    if (n == 0 || !(m->jacobian || (m->forward && wanted)))
+    if (n == 0 || m->quadratures > 0 || !(m->jacobian || (m->forward && wanted)))
         return;
     of->jacobian = take(cursor, n * vector);
     of->matrix = take(cursor, n * vector);
@@ -78,6 +79,17 @@ static void lay_out_implicit(Engine *engine, Cursor *cursor)
     of->pivots = take(cursor, n * sizeof(size_t));
     of->stages = take(cursor, STAGES_OF_RODAS * vector);
     of->probe_stages = take(cursor, STAGES_OF_RODAS * vector);
+}
+
+static void lay_out_quadrature(Engine *engine, Cursor *cursor)
+{
+    size_t vector = engine->model->n_states * sizeof(double), levels = engine->model->quadratures;
+    if (levels == 0)
+        return;
+    engine->quadrature.rates = take(cursor, N_NODES * vector);
+    engine->quadrature.states = take(cursor, levels > 1 ? N_NODES * vector : 0);
+    engine->quadrature.series = take(cursor, N_SERIES * vector);
+    engine->quadrature.tails = take(cursor, vector);
 }
 
 static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
@@ -96,6 +108,7 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     }
     engine->step.vectors = take(&cursor, engine->method->n_vectors * vector);
     lay_out_implicit(engine, &cursor);
+    lay_out_quadrature(engine, &cursor);
     engine->probe_x = take(&cursor, vector);
     engine->dense_x = take(&cursor, vector);
     engine->margins = take(&cursor, rows * sizeof(double));
@@ -196,7 +209,8 @@ static bool all_finite(const double *values, size_t n)
 /* Time, step and states are numbers; a level is one, or infinite where a margin is. */
 static bool point_is_sound(const Model *m, const Point *point)
 {
-    bool sound = all_finite(point->time, 2 + m->n_states + m->n_discrete) && *point->step >= 0.0;
+    bool sound = all_finite(point->time, 3 + m->n_states + m->n_discrete) && *point->step >= 0.0;
+    sound = sound && *point->reach >= 0.0;
     for (size_t i = 0; i <= m->n_margins; i++)
         sound = sound && !isnan(point->level[i]);
     return sound && all_finite(point->size, m->n_states + N_PROGRESS);
@@ -206,8 +220,9 @@ static bool segment_is_sound(const Engine *engine)
 {
     const Status *status = engine->status;
     bool sound =
-        isfinite(status->segment_begin) && isfinite(status->segment_end) &&
-        status->segment_begin < status->segment_end && status->segment_quiet <= status->segment_end;
+        status->segment_terms <= engine->method->n_vectors && isfinite(status->segment_begin) &&
+        isfinite(status->segment_end) && status->segment_begin < status->segment_end &&
+        status->segment_quiet <= status->segment_end;
     sound = sound && all_finite(engine->segment, engine->method->n_vectors * engine->model->n_states);
     return (sound || !status->has_segment) && !status->behind;
 }

@@ -11,7 +11,7 @@ Engine *engine_create(const Model *m, size_t wrapper_size)
     if (!engine)
         return NULL;
     engine->model = m;
-    engine->method = &engine_dormand_prince;
+    engine->method = m->quadratures > 0 ? &engine_quadrature : &engine_dormand_prince;
     engine->wrapper_size = wrapper_size;
     if (!engine_take_memory(engine)) {
         engine_free(engine);

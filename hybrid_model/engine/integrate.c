@@ -60,6 +60,8 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
     const Method *method = engine->method;
     double t0 = *point->time, remaining = limit - t0, h = *point->step;
     bool rejected = false;
+    if (h <= 0.0 && method->remembers)
+        h = *point->reach;
     if (h <= 0.0) {
         if (!engine_first_step(engine, point, limit, engine_largest_state(engine, point, point->x), &h))
             return false;
@@ -73,10 +75,14 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
         step->t1 = whole ? limit : t0 + used;
         used = step->t1 - t0;
         double error;
+        step->n_terms = method->n_vectors;
+        step->n_windows = 1;
         if (!method->trial(engine, point, &error))
             return false;
         if (error <= 1.0) {
             *point->step = next_step(method, h, used, error, rejected);
+            if (method->remembers)
+                *point->reach = *point->step;
             step->has_vectors = false;
             engine->statistics.steps++;
             engine_watch_stiffness(engine, point);

@@ -67,6 +67,7 @@ typedef struct {
     bool has_flow_set;                 /* false: flow is allowed everywhere */
     Stiffness stiffness;
     bool predictable;                  /* all inputs discrete: the next event follows from the state */
+    size_t quadratures;                /* levels of the flow, if rates depend on states of lower levels only; else 0 */
     const double *x, *z, *u, *p;       /* start values; NULL where whoever runs the model has them */
     const double *nominals;            /* a usual size of each continuous state, 0 if none is declared */
     const bool *whole;                 /* of each discrete state: whether it is declared integer */

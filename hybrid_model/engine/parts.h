@@ -27,19 +27,18 @@
    is no more than so many steps of the solver away. */
 #define STEPS_AHEAD 1000.0
 #define STEPS_BELOW 100.0
-/* A step that communication points are read from is that much shorter than its error allows: the error of the
-   interpolation is some ten times as great, and falls with the fifth power. */
-#define SEGMENT_PART 0.35
 
-/* A point of the run.  time, step, x, z, level, size and progress lie one after the other in memory, so one copy
+/* A point of the run.  time, step, reach, x, z, level, size and progress lie one after the other in memory, so one copy
    moves them all; size holds the largest value that each continuous state has had; step is the solver's
-   proposal for the next step, 0 when there is none.  level is the margin from which on each guard is
+   proposal for the next step, 0 when there is none; reach is the last one that there was, for methods that
+   remember it beyond jumps.  level is the margin from which on each guard is
    enabled: 0, or slightly below where a flow ended so shortly
    before the crossing that it counts as reached.  Its last entry is the margin of the flow set up to
    which, under flow priority, the state is on the border: 0, or slightly above for the same reason. */
 typedef struct {
     double *time;
     double *step;
+    double *reach;
     double *x;
     double *z;
     double *level;
@@ -64,9 +63,16 @@ typedef struct {
     double *k[N_STAGES];
     double *vectors;          /* of the interpolation, made when first needed */
     bool has_vectors;
+    size_t n_terms;           /* vectors behind these are zero */
+    size_t n_windows;         /* equal parts in each of which events are looked for */
 } Step;
 
 typedef struct Method Method;
+
+/* What quadratures need beside the step: vectors at the nodes of a series, and of series. */
+typedef struct {
+    double *rates, *states, *series, *tails;
+} Quadrature;
 
 /* What is known of the time up to the predicted point: that an event is there, that a look ahead ended there for its
    limit of steps, that nothing happens before it, or that nothing happens on the solver's step that leads there. */
@@ -96,6 +102,7 @@ typedef struct {
     double stride;                /* what a first step may take from the steps before the last jump or change, or 0 */
     /* The live point lies on a step of the solver that goes on to segment_end; before segment_quiet nothing happens. */
     double segment_begin, segment_end, segment_quiet;
+    uint64_t segment_terms;
     int32_t has_segment;
     int32_t behind;               /* the live point's states do not belong to its time yet: see engine_catch_up */
     int32_t has_inner_rates;
@@ -147,6 +154,7 @@ struct Engine {
     double *w;
     Step step;
     Implicit implicit;            /* without places where no method for stiff flows may be needed */
+    Quadrature quadrature;
     double *probe_k[N_STAGES], *probe_x, *dense_x;
     double *margins, *enabled, *times, *samples;
     double *outputs, *rates, *indicators;   /* of the view */
@@ -180,7 +188,7 @@ typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_CHANGED, FLOW_BUDGET, FLOW_PROBLEM
 /* The files of the engine from the lowest to the highest: each calls functions of those before it only.  Those of
    engine.h are in message.c, segment.c, block.c, recorder.c, values.c, jumps.c, create.c, views.c, sensitivity.c (after
    differences.c), predict.c, outside.c and engine.c, the last ones; samples.c, rises.c and crossings.c, before
-   locate.c, are in search.h; methods, before create.c, in method.h. */
+   locate.c, are in search.h; methods, before create.c, in method.h, and chebyshev.c, before those, in chebyshev.h. */
 
 /* message.c */
 /* Notes why something cannot be done; always false, so that callers can return it. */

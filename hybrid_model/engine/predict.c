@@ -2,7 +2,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "parts.h"
+#include "method.h"
 
 /* How far a look ahead goes: a call of the importer's must come back in a fraction of a second, also where one
    step of the solver is a matter of thousands of states and margins. */
@@ -78,7 +78,7 @@ static bool look_one_step_ahead(Engine *engine)
     if (!engine_take_internal_jumps(engine, &engine->live))
         return false;
     engine_copy_point(engine, &engine->live, ahead);
-    *ahead->step *= SEGMENT_PART;
+    *ahead->step *= engine->method->segment_part;
     engine->keeps = true;
     FlowEnd end = engine_flow(engine, ahead, fmin(limit, fmax(status->stop_time, engine->target)), true, &budget);
     engine->keeps = false;
@@ -131,7 +131,7 @@ static bool follow_steps(Engine *engine, double target)
         engine_clear_levels(engine, live);
         double limit = fmin(known, engine_next_time(engine, live, false, true));
         if (*live->step > 0.0)
-            limit = fmin(limit, *live->time + SEGMENT_PART * *live->step);
+            limit = fmin(limit, *live->time + engine->method->segment_part * *live->step);
         if (!engine_step_begin(engine, live) || !engine_step_accept(engine, live, limit))
             return false;
         keep_segment(engine, known);

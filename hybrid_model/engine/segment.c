@@ -14,6 +14,7 @@ void engine_catch_up(Engine *engine)
         return;
     double t = *engine->live.time;
     double a = (t - status->segment_begin) / (status->segment_end - status->segment_begin);
-    engine->method->interpolate(engine->segment, engine->model->n_states, a, engine->live.x);
+    engine->method->interpolate(engine->segment, (size_t)status->segment_terms, engine->model->n_states, a,
+                                engine->live.x);
     status->behind = false;
 }

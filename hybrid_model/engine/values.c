@@ -46,7 +46,7 @@ void engine_note_sizes(const Engine *engine, const Point *point)
 void engine_begin_anew(const Engine *engine, const Point *point)
 {
     if (*point->step > 0.0)
-        engine->status->stride = SEGMENT_PART * *point->step;
+        engine->status->stride = engine->method->segment_part * *point->step;
     *point->step = 0.0;
 }
 

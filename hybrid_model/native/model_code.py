@@ -13,6 +13,7 @@ from hybrid_model.declare.transitions import Priority, Trigger
 from hybrid_model.declare.variables import Kind
 from hybrid_model.native.c_text import array, boolean, constant, definition, functions, row, string
 from hybrid_model.native.derivatives import derivative_functions, jacobian_function
+from hybrid_model.native.flow_structure import levels_of_quadratures
 from hybrid_model.native.names import NameTable
 from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.trace import Trace, changed
@@ -194,6 +195,7 @@ def _model(traced: Trace | NetworkTrace, work: Sequence[int], name: str, *, star
         "flow_priority": boolean(automaton.priority is Priority.FLOW),
         "has_flow_set": boolean(automaton.has_flow_set),
         "stiffness": _STIFFNESS[automaton.stiff],
+        "quadratures": levels_of_quadratures(traced.pattern("flow", "x")),
         "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" if starts else "NULL" for name in _VECTORS},
         **{name: f"hybrid_{name}" for name in _MAPS},

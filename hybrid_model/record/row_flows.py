@@ -12,6 +12,7 @@ from typing import overload
 
 import numpy as np
 import numpy.typing as npt
+from numpy.polynomial.chebyshev import chebval
 
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.record.flow_piece import FlowPiece, refuse_inside
@@ -20,9 +21,9 @@ from hybrid_model.record.jump_record import JumpRecord
 
 Counts = npt.NDArray[np.int64]
 
-_VECTORS = 5
 _BEFORE_STATES = 3
 """Numbers in a row before those of the states."""
+_NESTED_VECTORS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +59,7 @@ class Rows:
         starts, ends = jumps[:, 1], np.append(jumps[1:, 1], end)
         reached = np.vstack([jumps[1:, _BEFORE_STATES : _BEFORE_STATES + states], x])
         flown = ends > starts
-        unknown = np.full((len(jumps), _VECTORS * states), np.nan)
+        unknown = np.full((len(jumps), _NESTED_VECTORS * states), np.nan)
         steps = np.hstack([starts[:, None], ends[:, None], ends[:, None], reached, unknown])[flown]
         counted = jumps.copy()
         counted[:, 0] = np.concatenate([[0], np.cumsum(flown)[:-1]])
@@ -106,7 +107,7 @@ class Rows:
     def vectors(self, step: int | Counts) -> FloatArray:
         """Return the vectors of the interpolation of a step, shape (vectors, states), or of steps."""
         given = self.steps[step, _BEFORE_STATES + self.states :]
-        count = given.shape[-1] // self.states if self.states else _VECTORS
+        count = given.shape[-1] // self.states if self.states else _NESTED_VECTORS
         return given.reshape(*given.shape[:-1], count, self.states)
 
     def at(self, flows: Counts, times: FloatArray) -> FloatArray:
@@ -121,7 +122,7 @@ class Rows:
         row = self.steps[step]
         if self.events_only and (t < row[:, 2]).any():
             refuse_inside(t[t < row[:, 2]])
-        found = nested(self.vectors(step), ((t - row[:, 0]) / (row[:, 1] - row[:, 0]))[:, None])
+        found = interpolated(self.vectors(step), ((t - row[:, 0]) / (row[:, 1] - row[:, 0]))[:, None])
         states[inside] = np.where((t >= row[:, 2])[:, None], self.reached[step], found)
         return states
 
@@ -132,16 +133,23 @@ class Rows:
         return np.clip(step, self.firsts[flows], self.firsts[flows + 1] - 1)
 
 
-def nested(vectors: FloatArray, a: FloatArray | float) -> FloatArray:
-    """Evaluate interpolations at parts of their steps (hybrid_model/engine/methods/dense.c).
+def interpolated(vectors: FloatArray, a: FloatArray | float) -> FloatArray:
+    """Evaluate interpolations at parts of their steps.
 
     Parameters
     ----------
-    vectors : ndarray, shape (..., 5, states)
-        The state at the start, its change, and three of its curvature.
+    vectors : ndarray, shape (..., 5, states) or (..., k, states)
+        Five: the state at the start, its change, and three of its curvature (hybrid_model/engine/methods/dense.c). More: the
+        coefficients of a Chebyshev series (hybrid_model/engine/methods/chebyshev.c).
     a : float or ndarray, broadcast against (..., states)
         From 0 at the start of a step to 1 at its end.
     """
+    if vectors.shape[-2] == _NESTED_VECTORS:
+        return _nested(vectors, a)
+    return np.asarray(chebval(2.0 * np.asarray(a) - 1.0, np.moveaxis(vectors, -2, 0), tensor=False))
+
+
+def _nested(vectors: FloatArray, a: FloatArray | float) -> FloatArray:
     b = 1.0 - a
     x0, change, d0, d1, d2 = (vectors[..., k, :] for k in range(5))
     return np.asarray(x0 + a * (change + b * (d0 + a * (d1 + b * d2))))
@@ -157,7 +165,7 @@ class _Interpolation:
 
     def __call__(self, t: float | FloatArray) -> FloatArray:
         part = (np.asarray(t) - self.t0) / (self.t1 - self.t0)
-        return nested(self.vectors, part) if part.ndim == 0 else nested(self.vectors, part[:, None]).T
+        return interpolated(self.vectors, part) if part.ndim == 0 else interpolated(self.vectors, part[:, None]).T
 
 
 class RowFlows(Sequence[FlowRecord]):

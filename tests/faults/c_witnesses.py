@@ -1,7 +1,7 @@
 """Models that the C harness is run with: together they use every part of the runtime."""
 
 from c_runs import Witness
-from witnesses import Cascade, FlowFirst, Hill, Mix, Ramps, Timers
+from witnesses import Cascade, FlowFirst, Hill, Mix, Ramps, Swing, Timers
 
 from hybrid_model.consensus.weights.gated_sine import GatedSineWeights
 from hybrid_model.models import BouncingBall
@@ -15,6 +15,8 @@ WITNESSES = {
     ),
     # Two crossings within a step.
     "hill": Witness(Hill(begin=0.7, end=0.7 + 1e-4), 2.0, 2),
+    # Quadratures of two levels, across a breakpoint.
+    "swing": Witness(Swing(), 2.3, 19),
     "cascade": Witness(Cascade(links=5.0), 2.5, 5),
     # No continuous state, a breakpoint at the time of a timer, a discrete input.
     "timers": Witness(Timers(), 2.1, 12, changes=((0.61, "command", 1.0), (1.33, "command", 0.2))),

@@ -73,6 +73,33 @@ class Hill(hm.HybridAutomaton):
         return {"count": s.count + 1, "seen": s.x}
 
 
+class Swing(hm.HybridAutomaton):
+    """A way whose speed swings with time and is another one from a hidden time on, and the way's own integral.
+
+    At the limit the way starts anew.
+    """
+
+    way = hm.State(0.0, output=True)
+    area = hm.State(0.2, output=True)
+    limit = hm.Parameter(1.0)
+    hidden = hm.Parameter(0.9)
+    speed = hm.DiscreteState(4.0)
+    count = hm.DiscreteState(0, integer=True, output=True)
+
+    def flow_map(self, s):
+        return {"area": s.way, "way": s.speed * np.sin(5.0 * s.t) ** 2}
+
+    transitions = (
+        hm.TimeEvent(
+            "change",
+            lambda self, s: np.where(s.speed > 3.0, s.hidden, np.inf),
+            lambda self, s: {"speed": 2.5},
+            internal=True,
+        ),
+        hm.Jump("limit", lambda self, s: s.way - s.limit, lambda self, s: {"way": 0.0, "count": s.count + 1}),
+    )
+
+
 class Cascade(hm.HybridAutomaton):
     """At every whole second `links` jumps in a row at one instant, by three jumps in turn."""
 

@@ -1,4 +1,4 @@
-/* The first time in a step at which a guard is crossed, or the flow set left.
+/* The first time in a window of a step at which a guard is crossed, or the flow set left.
 
    The interpolation of the step is searched for brackets (rises.c).  The time is then polished on the
    solver's own step from t0, so that time and state belong together; it is the end of the bracket at
@@ -6,6 +6,7 @@
    leaving. */
 #include <math.h>
 
+#include "method.h"
 #include "search.h"
 
 /* First move of a bracket's end where the interpolation and the step disagree, as a part of the step. */
@@ -77,9 +78,11 @@ static bool confirm(Search *search, size_t row, Bracket *bracket)
 static bool locate_on_step(Search *search, size_t row, Bracket *bracket)
 {
     const Step *step = &search->engine->step;
-    engine_refine_bracket(search, ON_INTERPOLATION, FIRST_STRIDE * (step->t1 - step->t0), row, bracket);
-    if (search->failed || !confirm(search, row, bracket))
-        return false;
+    if (!search->engine->method->is_exact) {
+        engine_refine_bracket(search, ON_INTERPOLATION, FIRST_STRIDE * (step->t1 - step->t0), row, bracket);
+        if (search->failed || !confirm(search, row, bracket))
+            return false;
+    }
     engine_refine_bracket(search, ON_STEP, 0.0, row, bracket);
     return !search->failed;
 }
@@ -125,7 +128,7 @@ double engine_last_inside(Search *search, double t)
 {
     Rises rises;
     Bracket next, bracket = {.b = -INFINITY};
-    engine_begin_rises(&rises, search, search->exit_row, 0.0);
+    engine_begin_rises_of_step(&rises, search, search->exit_row, 0.0);
     while (engine_next_rise(&rises, t, &next) && next.a < t)
         bracket = next;
     if (search->failed || !isfinite(bracket.b))
@@ -151,7 +154,7 @@ bool engine_first_exit(Search *search, double latest, double *t)
         return false;
     double border = engine_flow_border(search->engine, search->point, step->t1, step->x1);
     double beyond = search->level < -border ? border : border + search->level;
-    *t = step->t0;
+    *t = search->begin;
     if (engine_sample(search, 0, search->exit_row) > beyond)
         return true;
     engine_begin_rises(&rises, search, search->exit_row, beyond);

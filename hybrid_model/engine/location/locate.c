@@ -239,7 +239,7 @@ static bool refuse_indicators(Engine *engine, const Search *search)
                 "Remedy: return a number that is zero or above inside the set and negative outside.",
                 row == search->exit_row ? "the flow set" : "jump '",
                 row == search->exit_row ? "" : NAME_AT(m->names, m->margin_names[row]),
-                row == search->exit_row ? "" : "'", engine->step.t1);
+                row == search->exit_row ? "" : "'", search->end);
     }
     return true;
 }
@@ -258,33 +258,50 @@ static void hold_to_set(Search *search)
     search->level = 0.0;
 }
 
+/* Looks for the first event in the window. */
+static FlowEnd locate_in_window(Search *search)
+{
+    Engine *engine = search->engine;
+    for (size_t i = 0; i < N_SAMPLES; i++) {
+        double t = engine_sample_time(search->begin, search->end, i);
+        if (!engine_look(search, ON_INTERPOLATION, t, engine->samples + i * search->n_rows))
+            return FLOW_PROBLEM;
+    }
+    if (!refuse_indicators(engine, search))
+        return FLOW_PROBLEM;
+    hold_to_set(search);
+    double guard = INFINITY, leaving = INFINITY; /* lines 16 and 17 */
+    bool has_guard = engine_first_guard(search, &guard);
+    /* An exit within one instant before a guard, or after it, gives way. */
+    double latest = has_guard ? guard - engine_one_instant(engine, guard) : (double)INFINITY;
+    bool leaves = engine->model->has_flow_set && !search->failed && engine_first_exit(search, latest, &leaving);
+    if (search->failed)
+        return FLOW_PROBLEM;
+    if (has_guard && (!leaves || guard <= leaving + engine_one_instant(engine, leaving))) {
+        guard = common_time(search, guard); /* line 18 */
+        if (search->failed || (guard + engine_one_instant(engine, guard) > search->piece_end &&
+                               !engine_raise_levels(engine, search->point, guard)))
+            return FLOW_PROBLEM;
+        return move_to(search, guard);
+    }
+    return leaves ? leave_flow_set(search, leaving) : FLOW_REACHED;
+}
+
 FlowEnd engine_locate_event(Engine *engine, const Point *point, double level, double piece_end)
 {
     const Model *m = engine->model;
+    const Step *step = &engine->step;
     Search search = search_at(engine, point, level, piece_end);
     if (m->n_margins == 0 && !m->has_flow_set)
         return FLOW_REACHED;
-    for (size_t i = 0; i < N_SAMPLES; i++) {
-        double t = engine_sample_time(engine->step.t0, engine->step.t1, i);
-        if (!engine_look(&search, ON_INTERPOLATION, t, engine->samples + i * search.n_rows))
-            return FLOW_PROBLEM;
+    search.end = step->t0;
+    for (size_t window = 1; window <= step->n_windows; window++) {
+        double part = (double)window / (double)step->n_windows;
+        search.begin = search.end;
+        search.end = window == step->n_windows ? step->t1 : step->t0 + part * (step->t1 - step->t0);
+        FlowEnd found = locate_in_window(&search);
+        if (found != FLOW_REACHED)
+            return found;
     }
-    if (!refuse_indicators(engine, &search))
-        return FLOW_PROBLEM;
-    hold_to_set(&search);
-    double guard = INFINITY, leaving = INFINITY; /* lines 16 and 17 */
-    bool has_guard = engine_first_guard(&search, &guard);
-    /* An exit within one instant before a guard, or after it, gives way. */
-    double latest = has_guard ? guard - engine_one_instant(engine, guard) : (double)INFINITY;
-    bool leaves = m->has_flow_set && !search.failed && engine_first_exit(&search, latest, &leaving);
-    if (search.failed)
-        return FLOW_PROBLEM;
-    if (has_guard && (!leaves || guard <= leaving + engine_one_instant(engine, leaving))) {
-        guard = common_time(&search, guard); /* line 18 */
-        if (search.failed ||
-            (guard + engine_one_instant(engine, guard) > piece_end && !engine_raise_levels(engine, point, guard)))
-            return FLOW_PROBLEM;
-        return move_to(&search, guard);
-    }
-    return leaves ? leave_flow_set(&search, leaving) : FLOW_REACHED;
+    return FLOW_REACHED;
 }

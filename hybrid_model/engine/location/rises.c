@@ -7,6 +7,7 @@
    hybrid_model/reference/zero_crossings.py finds the same, with halvings. */
 #include <math.h>
 
+#include "method.h"
 #include "search.h"
 
 /* Chebyshev-Lobatto points on [0, 1]. */
@@ -148,16 +149,20 @@ static Shape polynomial(const double *samples)
     return shape;
 }
 
-static Verdict judge(const double *samples)
+static Verdict judge(const double *samples, bool is_exact)
 {
     Verdict verdict;
     if (!all_finite(samples))
         return between_samples(true, samples);
     Shape shape = parabola(samples);
-    if (ends_decide(&shape, samples, &verdict))
-        return verdict;
-    shape = polynomial(samples);
-    return ends_decide(&shape, samples, &verdict) ? verdict : between_samples(false, samples);
+    bool settled = ends_decide(&shape, samples, &verdict);
+    if (!settled) {
+        shape = polynomial(samples);
+        settled = ends_decide(&shape, samples, &verdict);
+    }
+    /* A step that is known at its ends only is looked at between them, another one between the nearest samples. */
+    bool nearest = !settled || (is_exact && verdict.low < verdict.high);
+    return nearest ? between_samples(settled, samples) : verdict;
 }
 
 /* Where a piece that is not settled is split, as a part of it: where it has a kink, if it has one, so that what is left
@@ -190,25 +195,36 @@ static double split_point(const double *samples)
     return at;
 }
 
-void engine_begin_rises(Rises *rises, Search *search, size_t row, double threshold)
+static void begin(Rises *rises, Search *search, size_t row, double threshold, double start, double value)
 {
-    const Step *step = &search->engine->step;
     rises->search = search;
     rises->row = row;
     rises->threshold = threshold;
-    rises->begin = step->t0;
-    rises->value = engine_sample(search, 0, row) - threshold;
-    rises->ends[0] = step->t1;
+    rises->sampled = false;
+    rises->begin = start;
+    rises->value = value - threshold;
+    rises->ends[0] = search->end;
     rises->n_ends = 1;
     rises->splits = 0;
+}
+
+void engine_begin_rises(Rises *rises, Search *search, size_t row, double threshold)
+{
+    begin(rises, search, row, threshold, search->begin, engine_sample(search, 0, row));
+    rises->sampled = true;
+}
+
+void engine_begin_rises_of_step(Rises *rises, Search *search, size_t row, double threshold)
+{
+    double t0 = search->engine->step.t0;
+    begin(rises, search, row, threshold, t0, engine_look_at(search, ON_INTERPOLATION, t0, row));
 }
 
 /* The row at the points of the piece from rises->begin to `end`. */
 static void sample_piece(const Rises *rises, double end, double *samples)
 {
     Search *search = rises->search;
-    const Step *step = &search->engine->step;
-    bool whole = rises->begin == step->t0 && end == step->t1;
+    bool whole = rises->sampled && rises->begin == search->begin && end == search->end;
     samples[0] = rises->value;
     for (size_t i = 1; i < N_SAMPLES; i++) {
         double value =
@@ -226,7 +242,7 @@ bool engine_next_rise(Rises *rises, double latest, Bracket *bracket)
         sample_piece(rises, end, samples);
         if (rises->search->failed)
             return false;
-        Verdict verdict = judge(samples);
+        Verdict verdict = judge(samples, rises->search->engine->method->is_exact);
         double shortest = DEGREE * DEGREE * fmax(engine_time_ulp(begin), engine_time_ulp(end));
         if (!verdict.settled && rises->splits < SPLITS && end - begin > shortest) {
             double part = rises->splits++ % 4 < 3 ? split_point(samples) : 0.5;

@@ -19,6 +19,7 @@ typedef struct {
     const Point *point;
     double level;             /* the margin of the flow set that is to be kept */
     double piece_end;         /* the flow may be probed up to here */
+    double begin, end;        /* the window of the step whose samples are there */
     size_t n_rows, exit_row;
     bool failed;
 } Search;
@@ -36,6 +37,7 @@ typedef struct {
     Search *search;
     size_t row;
     double threshold;
+    bool sampled;             /* the samples are those of the whole window */
     double begin, value;      /* the start of the next piece, and the row there less the threshold */
     double ends[SPLITS + 1];
     size_t n_ends;
@@ -50,26 +52,28 @@ bool engine_look(Search *search, Path path, double t, double *rows);
 bool engine_try_to_look(Search *search, Path path, double t, double *rows);
 /* The value of one row. */
 double engine_look_at(Search *search, Path path, double t, size_t row);
-/* The value of one row in a sample of the present step. */
+/* The value of one row in a sample of the window. */
 double engine_sample(const Search *search, size_t i, size_t row);
 
 /* rises.c */
 /* The time of a sample of the piece from a to b. */
 double engine_sample_time(double a, double b, size_t i);
-/* Begins at the start of the present step, whose samples must be there. */
+/* Begins at the start of the window, whose samples must be there. */
 void engine_begin_rises(Rises *rises, Search *search, size_t row, double threshold);
+/* Begins at the start of the step, and ends with the window. */
+void engine_begin_rises_of_step(Rises *rises, Search *search, size_t row, double threshold);
 /* The next bracket among the pieces that begin up to `latest`; false if there is none, or on failure. */
 bool engine_next_rise(Rises *rises, double latest, Bracket *bracket);
 
 /* crossings.c */
 /* Shrinks a bracket on the solver's step to the width at which a crossing is located. */
 void engine_refine_bracket(Search *search, Path path, double wide, size_t row, Bracket *bracket);
-/* The first guard crossing on the step; with flow priority guards are not looked at inside the flow set. */
+/* The first guard crossing in the window; with flow priority guards are not looked at inside the flow set. */
 bool engine_first_guard(Search *search, double *t);
 /* The last time before `t` at which the flow set's margin falls below zero: minus infinity if the interpolation has
    none, not a number if the step has none. */
 double engine_last_inside(Search *search, double t);
-/* The time at which the flow set is left, if the step leaves it by more than the tolerance. */
+/* The time at which the flow set is left, if the window leaves it by more than the tolerance. */
 bool engine_first_exit(Search *search, double latest, double *t);
 
 #if defined(__GNUC__)

@@ -132,6 +132,7 @@ static double stiffness(const Engine *engine, const Point *point)
 const Method engine_dormand_prince = {
     .n_vectors = NESTED_VECTORS,
     .order = 5.0,
+    .segment_part = NESTED_SEGMENT_PART,
     .trial = trial,
     .probe = probe,
     .prepare = prepare,

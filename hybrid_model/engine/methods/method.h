@@ -11,6 +11,8 @@
 /* Of an interpolation that meets the step at both ends: x0 + a (c + b (d0 + a (d1 + b d2))) with a from 0 to 1 on the
    step and b = 1 - a, after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I", II.6. */
 #define NESTED_VECTORS 5
+/* Its error is some ten times that of the step, and falls with the fifth power. */
+#define NESTED_SEGMENT_PART 0.35
 #define STAGES_OF_RODAS 8
 
 /* engine->step goes from (t0, x0), where its rates are in k[0].  The vectors of an interpolation lie one after the
@@ -19,6 +21,9 @@ struct Method {
     size_t n_vectors;         /* of its interpolation */
     double order;             /* the error of a step of h falls like h to this power */
     double finest_tolerance;  /* relative: below, rounding would decide about steps, or cost grows without use */
+    bool is_exact;            /* the interpolation is the step itself */
+    bool remembers;           /* steps begin with the length that was possible before, also after a jump */
+    double segment_part;      /* a step that communication points are read from is so much shorter than it may be */
     /* Makes the step to step->t1: the state there in step->x1, the rates there in step->k[N_STAGES - 1], and the error
        in units of the tolerance (engine_error_scale), infinite where anything is not finite, with the state that is to
        blame in engine->suspect.  False if a map cannot be evaluated. */
@@ -27,8 +32,8 @@ struct Method {
     bool (*probe)(Engine *engine, const Point *point, double t);
     /* Makes the vectors of the interpolation of the accepted step: step->vectors. */
     void (*prepare)(Engine *engine);
-    /* Evaluates vectors at the part a of a step, from 0 to 1. */
-    void (*interpolate)(const double *vectors, size_t n_states, double a, double *x);
+    /* Evaluates vectors, of which those behind n_terms are zero, at the part a of a step, from 0 to 1. */
+    void (*interpolate)(const double *vectors, size_t n_terms, size_t n_states, double a, double *x);
     /* The vectors of the straight way from x0 to x1. */
     void (*straight)(const double *x0, const double *x1, size_t n_states, double *vectors);
     /* How many times the accepted step is longer than the fastest time scale that shows in it; NULL for methods whose
@@ -36,7 +41,7 @@ struct Method {
     double (*stiffness)(const Engine *engine, const Point *point);
 };
 
-extern const Method engine_dormand_prince, engine_rodas;
+extern const Method engine_dormand_prince, engine_rodas, engine_quadrature;
 
 /* linear_equations.c */
 /* Replaces a matrix, whose columns lie one after the other, by its factors; false if they are not finite or there are
@@ -50,7 +55,7 @@ void engine_solve(size_t n, const double *factors, const size_t *pivots, double 
 bool engine_jacobian(Engine *engine, const Point *point);
 
 /* dense.c */
-void engine_interpolate_nested(const double *vectors, size_t n_states, double a, double *x);
+void engine_interpolate_nested(const double *vectors, size_t n_terms, size_t n_states, double a, double *x);
 void engine_straight_nested(const double *x0, const double *x1, size_t n_states, double *vectors);
 
 #if defined(__GNUC__)

@@ -183,6 +183,7 @@ const Method engine_rodas = {
     .n_vectors = NESTED_VECTORS,
     .order = 5.0,
     .finest_tolerance = 1e-12,
+    .segment_part = NESTED_SEGMENT_PART,
     .trial = trial,
     .probe = probe,
     .prepare = prepare,

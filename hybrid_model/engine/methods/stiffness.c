@@ -16,6 +16,9 @@ void engine_choose_method(Engine *engine)
 {
     const Model *m = engine->model;
     double wish = engine->options.stiff;
+    /* Where no rate depends on its own state, nothing is stiff. */
+    if (m->quadratures > 0)
+        return;
     bool stiff = wish > 0.0 || (wish == 0.0 && (m->stiffness == STIFFNESS_DECLARED || engine->status->is_stiff));
     if (stiff && engine->implicit.jacobian)
         engine->method = &engine_rodas;
