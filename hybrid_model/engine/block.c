@@ -24,16 +24,16 @@ static void *take(Cursor *cursor, size_t size)
 
 static size_t point_length(const Model *m)
 {
-    return 3 + m->n_states + m->n_discrete + m->n_margins + 1 + m->n_states + N_PROGRESS;
+    return 2 + m->n_states + m->n_discrete + m->n_margins + 1 + m->n_states + N_PROGRESS;
 }
 
 static Point take_point(Cursor *cursor, const Model *m)
 {
     double *values = take(cursor, point_length(m) * sizeof(double));
     if (!values)
-        return (Point){NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
-    double *x = values + 3, *z = x + m->n_states, *level = z + m->n_discrete, *size = level + m->n_margins + 1;
-    return (Point){values, values + 1, values + 2, x, z, level, size, size + m->n_states};
+        return (Point){NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    double *x = values + 2, *z = x + m->n_states, *level = z + m->n_discrete, *size = level + m->n_margins + 1;
+    return (Point){values, values + 1, x, z, level, size, size + m->n_states};
 }
 
 /* Lays out the block; called once with no memory, to learn the size. */
@@ -209,8 +209,7 @@ static bool all_finite(const double *values, size_t n)
 /* Time, step and states are numbers; a level is one, or infinite where a margin is. */
 static bool point_is_sound(const Model *m, const Point *point)
 {
-    bool sound = all_finite(point->time, 3 + m->n_states + m->n_discrete) && *point->step >= 0.0;
-    sound = sound && *point->reach >= 0.0;
+    bool sound = all_finite(point->time, 2 + m->n_states + m->n_discrete) && *point->step >= 0.0;
     for (size_t i = 0; i <= m->n_margins; i++)
         sound = sound && !isnan(point->level[i]);
     return sound && all_finite(point->size, m->n_states + N_PROGRESS);

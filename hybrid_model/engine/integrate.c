@@ -6,6 +6,10 @@
 
 #include "method.h"
 
+/* A step that costs the same however long it is goes so many times as far as the flow before the last jump went: most
+   next events are within it, and not far from its start. */
+#define BEYOND_NEXT 2.0
+
 bool engine_step_begin(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
@@ -54,19 +58,27 @@ static double next_step(const Method *method, double h, double used, double erro
     return used < h ? fmax(h, proposal) : proposal;
 }
 
+/* The length of a step before which there is none since the last jump or change. */
+static bool length_after_jump(Engine *engine, const Point *point, double limit, double *h)
+{
+    double stride = engine->status->stride, largest = engine_largest_state(engine, point, point->x);
+    *h = fmax(BEYOND_NEXT * stride, engine->model->scales.first_least * engine_time_ulp(*point->time));
+    if (stride > 0.0 && engine->method->remembers)
+        return true;
+    if (!engine_first_step(engine, point, limit, largest, h))
+        return false;
+    *h = fmax(*h, fmin(stride, engine->model->scales.first_growth * *h));
+    return true;
+}
+
 bool engine_step_accept(Engine *engine, const Point *point, double limit)
 {
     Step *step = &engine->step;
     const Method *method = engine->method;
     double t0 = *point->time, remaining = limit - t0, h = *point->step;
     bool rejected = false;
-    if (h <= 0.0 && method->remembers)
-        h = *point->reach;
-    if (h <= 0.0) {
-        if (!engine_first_step(engine, point, limit, engine_largest_state(engine, point, point->x), &h))
-            return false;
-        h = fmax(h, fmin(engine->status->stride, engine->model->scales.first_growth * h));
-    }
+    if (h <= 0.0 && !length_after_jump(engine, point, limit, &h))
+        return false;
     h = fmin(h, engine->options.longest_step);
     for (;;) {
         /* The last two steps share what remains, so that no sliver is left. */
@@ -81,8 +93,6 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
             return false;
         if (error <= 1.0) {
             *point->step = next_step(method, h, used, error, rejected);
-            if (method->remembers)
-                *point->reach = *point->step;
             step->has_vectors = false;
             engine->statistics.steps++;
             engine_watch_stiffness(engine, point);

@@ -28,17 +28,15 @@
 #define STEPS_AHEAD 1000.0
 #define STEPS_BELOW 100.0
 
-/* A point of the run.  time, step, reach, x, z, level, size and progress lie one after the other in memory, so one copy
+/* A point of the run.  time, step, x, z, level, size and progress lie one after the other in memory, so one copy
    moves them all; size holds the largest value that each continuous state has had; step is the solver's
-   proposal for the next step, 0 when there is none; reach is the last one that there was, for methods that
-   remember it beyond jumps.  level is the margin from which on each guard is
+   proposal for the next step, 0 when there is none.  level is the margin from which on each guard is
    enabled: 0, or slightly below where a flow ended so shortly
    before the crossing that it counts as reached.  Its last entry is the margin of the flow set up to
    which, under flow priority, the state is on the border: 0, or slightly above for the same reason. */
 typedef struct {
     double *time;
     double *step;
-    double *reach;
     double *x;
     double *z;
     double *level;

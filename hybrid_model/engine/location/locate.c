@@ -6,10 +6,13 @@
 #include <float.h>
 #include <math.h>
 
+#include "method.h"
 #include "search.h"
 
 /* So many instants before an event an importer may stop. */
 #define IMPORTER_INSTANTS 50.0
+/* Two events that happen to be close say little of the next one. */
+#define MOST_SHORTENING 0.1
 
 static Search search_at(Engine *engine, const Point *point, double level, double piece_end)
 {
@@ -63,10 +66,13 @@ static FlowEnd move_to(Search *search, double t)
     if (!engine_step_probe(engine, point, t) ||
         (point == &engine->live && !engine_record_step(engine, t, engine->probe_x)))
         return FLOW_PROBLEM;
+    double interval = t - engine->status->jumps_time, before = engine->status->stride;
     *point->time = t;
     engine_begin_anew(engine, point);
     /* Events often come at equal intervals, or at shorter and shorter ones. */
-    engine->status->stride = fmin(engine->status->stride, t - engine->status->jumps_time);
+    if (engine->method->remembers)
+        interval = fmax(interval, MOST_SHORTENING * before);
+    engine->status->stride = fmin(engine->status->stride, interval);
     for (size_t i = 0; i < engine->model->n_states; i++)
         point->x[i] = engine->probe_x[i];
     engine_note_sizes(engine, point);

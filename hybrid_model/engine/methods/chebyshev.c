@@ -22,6 +22,20 @@ double engine_node(size_t j)
     return 0.5 * (1.0 - COSINE[j]);
 }
 
+static bool all_zero(const double *values, size_t n)
+{
+    size_t i = 0;
+    while (i < n && values[i] == 0.0)
+        i++;
+    return i == n;
+}
+
+static void set_zero(double *values, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        values[i] = 0.0;
+}
+
 /* Chebyshev coefficients of the polynomial through the values at the nodes of a grid: 2/degree times sums of them,
    weighted by cosines.  `even` holds the sums of values that lie opposite to each other, `odd` their differences. */
 static void fit(const double *values, size_t degree, double *coefficients)
@@ -70,7 +84,10 @@ size_t engine_integrate_series(size_t n, size_t stride, double h, const double *
         double first = rates[i];
         for (size_t j = 0; j <= degree; j++)
             values[j] = rates[j * stride * n + i] - first;
-        fit(values, degree, of);
+        if (all_zero(values, degree + 1))
+            set_zero(of, degree + 1);
+        else
+            fit(values, degree, of);
         of[0] += first;
         of[degree + 1] = of[degree + 2] = 0.0;
         for (size_t k = 1; k <= degree + 1; k++) {
@@ -85,7 +102,7 @@ size_t engine_integrate_series(size_t n, size_t stride, double h, const double *
         states[i] = constant;
         for (size_t k = 1; k < N_SERIES; k++)
             states[k * n + i] = k <= last ? terms[k] : 0.0;
-        tails[i] = 0.25 * fabs(h) * (fabs(of[degree - 1]) + fabs(of[degree])) / (double)degree;
+        tails[i] = 0.5 * fabs(h) * (fabs(of[degree - 1]) + fabs(of[degree]));
     }
     return n_terms;
 }

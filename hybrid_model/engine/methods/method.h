@@ -22,7 +22,7 @@ struct Method {
     double order;             /* the error of a step of h falls like h to this power */
     double finest_tolerance;  /* relative: below, rounding would decide about steps, or cost grows without use */
     bool is_exact;            /* the interpolation is the step itself */
-    bool remembers;           /* steps begin with the length that was possible before, also after a jump */
+    bool remembers;           /* steps need not begin short after a jump */
     double segment_part;      /* a step that communication points are read from is so much shorter than it may be */
     /* Makes the step to step->t1: the state there in step->x1, the rates there in step->k[N_STAGES - 1], and the error
        in units of the tolerance (engine_error_scale), infinite where anything is not finite, with the state that is to
