@@ -117,3 +117,41 @@ def test_no_two_crossings_in_one_step_are_lost(seed, exported):
     found = step_through(exported(automaton, f"waves{seed}", "2.0"), 20.0, [20.0], names=["risen"])
     times = [time for time, name in found.jumps if name == "rise" and time > 0]
     np.testing.assert_allclose(times, rises, rtol=0, atol=t[1])
+
+
+class Ripples(hm.HybridAutomaton):
+    """Slow rates, and a margin that swings far faster: steps are as long as the rates allow."""
+
+    phase = hm.State(0.0)
+    level = hm.Parameter(1.4)
+    rate = hm.Parameter(40.0)
+    inside = hm.DiscreteState(0, integer=True)
+
+    def flow_map(self, s):
+        return {"phase": 1.0 + 0.3 * np.cos(s.t)}
+
+    def height(self, s):
+        return np.sin(s.rate * s.phase) + 0.5 * np.sin(0.9 * s.phase) - s.level
+
+    transitions = (
+        hm.Jump("rise", lambda self, s: hm.least(self.height(s), 0.5 - s.inside), lambda self, s: {"inside": 1}),
+        hm.Jump(
+            "fall", lambda self, s: hm.least(-1e-8 - self.height(s), s.inside - 0.5), lambda self, s: {"inside": 0}
+        ),
+    )
+
+
+@pytest.mark.parametrize("rate", [20.0, 100.0, 300.0])
+def test_margins_much_faster_than_rates_are_looked_at_in_narrower_parts(rate):
+    """The three highest of hundreds of peaks count, the lowest of them by 1e-6."""
+    t = np.linspace(0.0, 20.0, 2000001)
+    phase = t + 0.3 * np.sin(t)
+    height = np.sin(rate * phase) + 0.5 * np.sin(0.9 * phase)
+    peaks = np.sort(height[1:-1][(height[1:-1] > height[:-2]) & (height[1:-1] > height[2:])])
+    level = peaks[-3] - 1e-6
+    above = height >= level
+    rises = t[1:][above[1:] & ~above[:-1]]
+    arc = hm.simulate(Ripples(level=level, rate=rate), 20.0, engine="native")
+    np.testing.assert_allclose(arc.event_times("rise"), rises, rtol=0, atol=t[1])
+    # A tenth of what a Runge-Kutta method takes.
+    assert arc.statistics.evaluations < 500

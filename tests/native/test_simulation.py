@@ -249,3 +249,45 @@ def test_a_run_of_many_states_can_be_interrupted_after_fewer_steps(monkeypatch):
     hm.simulate(Many(), 20.0, engine="native")
     assert len(counts) > 1
     assert np.diff(counts, prepend=0).max() * 100 <= 1e5
+
+
+class Chain(hm.HybridAutomaton):
+    """Quadratures of two levels whose steps need many terms; the way starts anew at each whole second."""
+
+    way = hm.State(0.2)
+    speed = hm.State(0.5)
+    due = hm.DiscreteState(1.0)
+
+    def flow_map(self, s):
+        return {"way": s.speed, "speed": np.cos(3.0 * s.t)}
+
+    transitions = (hm.TimeEvent("anew", lambda self, s: s.due, lambda self, s: {"way": 0.0, "due": s.due + 1.0}),)
+
+
+def test_quadratures_are_recorded_to_rounding_in_all_forms(tmp_path):
+    """Times within steps, parts, samples, copies and files against the closed form, which no step meets by itself."""
+    arc = hm.simulate(Chain(), 2.5, engine="native")
+    t = np.linspace(0.0, 2.5, 401)[1:]
+    begun = np.floor(t)
+
+    def integral(t):
+        return 0.5 * t - np.cos(3.0 * t) / 9.0
+
+    way = np.where(begun == 0.0, 0.2, 0.0) + integral(t) - integral(begun)
+    arc.save(tmp_path / "arc.npz")
+    part = arc.restrict(t=(0.3, 1.8))
+    inside = (t >= 0.3) & (t <= 1.8)
+    forms = {
+        "itself": (arc.at("way", t), way),
+        "copied": (pickle.loads(pickle.dumps(arc)).at("way", t), way),
+        "resampled": (arc.resample(t)["way"], way),
+        "in part": (part.at("way", t[inside]), way[inside]),
+        "from a file": (hm.load_arc(tmp_path / "arc.npz").at("way", t), way),
+    }
+    for form, (found, expected) in forms.items():
+        np.testing.assert_allclose(found, expected, rtol=0, atol=2e-14, err_msg=form)
+    assert arc.statistics.steps <= 9
+    events = hm.simulate(Chain(), 2.5, record="events", engine="native")
+    assert [jump.x_before[0] for jump in events.jumps] == pytest.approx(
+        [0.2 + integral(1.0) - integral(0.0), integral(2.0) - integral(1.0)], abs=2e-14
+    )

@@ -11,6 +11,8 @@
 
 /* So many instants before an event an importer may stop. */
 #define IMPORTER_INSTANTS 50.0
+/* A margin may swing that many times faster than the rates of an exact step before one window shows too little. */
+#define NARROWINGS 1024.0
 /* Two events that happen to be close say little of the next one. */
 #define MOST_SHORTENING 0.1
 
@@ -264,8 +266,8 @@ static void hold_to_set(Search *search)
     search->level = 0.0;
 }
 
-/* Looks for the first event in the window. */
-static FlowEnd locate_in_window(Search *search)
+/* Looks for the first event in the window; CHANGED where a narrower one would tell more, if it may be narrowed. */
+static FlowEnd locate_in_window(Search *search, bool may_narrow)
 {
     Engine *engine = search->engine;
     for (size_t i = 0; i < N_SAMPLES; i++) {
@@ -283,6 +285,8 @@ static FlowEnd locate_in_window(Search *search)
     bool leaves = engine->model->has_flow_set && !search->failed && engine_first_exit(search, latest, &leaving);
     if (search->failed)
         return FLOW_PROBLEM;
+    if (search->unsettled && may_narrow)
+        return FLOW_CHANGED;
     if (has_guard && (!leaves || guard <= leaving + engine_one_instant(engine, leaving))) {
         guard = common_time(search, guard); /* line 18 */
         if (search->failed || (guard + engine_one_instant(engine, guard) > search->piece_end &&
@@ -300,14 +304,26 @@ FlowEnd engine_locate_event(Engine *engine, const Point *point, double level, do
     Search search = search_at(engine, point, level, piece_end);
     if (m->n_margins == 0 && !m->has_flow_set)
         return FLOW_REACHED;
-    search.end = step->t0;
-    for (size_t window = 1; window <= step->n_windows; window++) {
-        double part = (double)window / (double)step->n_windows;
-        search.begin = search.end;
-        search.end = window == step->n_windows ? step->t1 : step->t0 + part * (step->t1 - step->t0);
-        FlowEnd found = locate_in_window(&search);
-        if (found != FLOW_REACHED)
+    double widest = (step->t1 - step->t0) / (double)step->n_windows, narrowest = widest / NARROWINGS, width = widest;
+    if (!engine->method->is_exact)
+        narrowest = widest;
+    search.begin = step->t0;
+    while (search.begin < step->t1) {
+        double level_before = search.level;
+        search.end = step->t1 - search.begin <= 1.5 * width ? step->t1 : search.begin + width;
+        search.unsettled = false;
+        FlowEnd found = locate_in_window(&search, width > narrowest);
+        if (found == FLOW_CHANGED) {
+            search.level = level_before;
+            width *= 0.5;
+        } else if (found != FLOW_REACHED) {
             return found;
+        } else {
+            /* What no narrower window settles is rounding. */
+            if (search.unsettled)
+                width = narrowest = widest;
+            search.begin = search.end;
+        }
     }
     return FLOW_REACHED;
 }

@@ -249,6 +249,7 @@ bool engine_next_rise(Rises *rises, double latest, Bracket *bracket)
             rises->ends[rises->n_ends++] = begin + part * (end - begin);
             continue;
         }
+        rises->search->unsettled = rises->search->unsettled || (!verdict.settled && rises->splits == SPLITS);
         rises->n_ends--;
         rises->begin = end;
         rises->value = samples[DEGREE];

@@ -22,6 +22,7 @@ typedef struct {
     double begin, end;        /* the window of the step whose samples are there */
     size_t n_rows, exit_row;
     bool failed;
+    bool unsettled;           /* some row was split as often as may be, and is decided by its samples */
 } Search;
 
 typedef enum { ON_INTERPOLATION, ON_STEP } Path;
