@@ -55,12 +55,14 @@ static FlowEnd flow_piece(Engine *engine, const Point *point, double limit, doub
             bool reached = locate && engine->problem == ENDED_NOT_FINITE && engine_reach_guard(engine, point, end);
             return reached ? FLOW_EVENT : FLOW_PROBLEM;
         }
+        FlowEnd found = locate ? engine_locate_event(engine, point, level, piece_end) : FLOW_REACHED;
+        if (found == FLOW_SHORTER)
+            continue;
         if (engine->keeps && point == &engine->predicted) {
             engine_segment_keep(engine);
             engine->keeps = false;
         }
         if (locate) {
-            FlowEnd found = engine_locate_event(engine, point, level, piece_end);
             if (found != FLOW_REACHED)
                 return found;
             if (engine->step.t1 >= end && !engine_raise_levels(engine, point, engine->step.t1)) /* line 15 */

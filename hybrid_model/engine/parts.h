@@ -180,8 +180,9 @@ struct Engine {
     char problem_message[MESSAGE_SIZE];
 };
 
-/* Why a flow ended.  CHANGED: the hook has set an input or a nearer target. */
-typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_CHANGED, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
+/* Why a flow ended.  CHANGED: the hook has set an input or a nearer target.  SHORTER: it has not; its step is to be
+   made again, of the length that the point has now. */
+typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_SHORTER, FLOW_CHANGED, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
 
 /* The files of the engine from the lowest to the highest: each calls functions of those before it only.  Those of
    engine.h are in message.c, segment.c, block.c, recorder.c, values.c, jumps.c, create.c, views.c, sensitivity.c (after

@@ -266,6 +266,20 @@ static void hold_to_set(Search *search)
     search->level = 0.0;
 }
 
+/* A polynomial over a step that leads far beyond the event has the rounding of states there: the step is made again, no
+   longer than the event asks for. */
+static bool is_too_long(const Search *search, double event)
+{
+    const Step *step = &search->engine->step;
+    const double far = 10.0, least = 1e3;
+    double wait = event - step->t0;
+    if (!search->engine->method->is_exact || !(far * wait < step->t1 - step->t0) ||
+        wait < least * engine_time_ulp(step->t0))
+        return false;
+    *search->point->step = 2.0 * wait;
+    return true;
+}
+
 /* Looks for the first event in the window; CHANGED where a narrower one would tell more, if it may be narrowed. */
 static FlowEnd locate_in_window(Search *search, bool may_narrow)
 {
@@ -287,6 +301,8 @@ static FlowEnd locate_in_window(Search *search, bool may_narrow)
         return FLOW_PROBLEM;
     if (search->unsettled && may_narrow)
         return FLOW_CHANGED;
+    if (is_too_long(search, fmin(guard, leaving)))
+        return FLOW_SHORTER;
     if (has_guard && (!leaves || guard <= leaving + engine_one_instant(engine, leaving))) {
         guard = common_time(search, guard); /* line 18 */
         if (search->failed || (guard + engine_one_instant(engine, guard) > search->piece_end &&
