@@ -230,6 +230,8 @@ bool engine_block_is_sound(const Engine *engine, void *block)
 {
     const Model *m = engine->model;
     Engine other = *engine;
+    if (!block)
+        return false;
     lay_out_block(&other, block);
     const Status *status = other.status;
     bool sound =

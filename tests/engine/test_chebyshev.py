@@ -134,6 +134,15 @@ def test_constant_and_linear_rates_leave_few_terms_and_no_rounding(series):
     np.testing.assert_allclose(series.at(found, n_terms, 0.5), [1.1 + 0.35 * 0.3, 0.7 * 0.25 * 0.25], rtol=1e-15)
 
 
+def test_what_overflows_is_not_dropped(series):
+    """A rate near the largest float: over a short step it is integrated, and what it leads to beyond floats is infinite."""
+    constant, x0 = np.full((FINEST + 1, 1), 1e308), np.zeros(1)
+    n_terms, found, _ = series.integrated(2, 0.5, x0, constant)
+    assert series.at_end(found, n_terms, x0)[0] == 0.5e308
+    n_terms, found, _ = series.integrated(2, 10.0, x0, constant)
+    assert series.at_end(found, n_terms, x0)[0] == np.inf
+
+
 def test_dropped_terms_are_below_the_rounding_of_what_is_left(series):
     """Terms of the last places of a large state go; the same terms of a state that is zero stay."""
     rates = 1e-18 * np.cos(3 * np.arccos(2 * series.nodes - 1))

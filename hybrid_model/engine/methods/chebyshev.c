@@ -69,7 +69,7 @@ static size_t last_term(const double *terms, size_t last, double size)
 {
     for (size_t k = 1; k <= last; k++)
         size = fmax(size, fabs(terms[k]));
-    while (last > 0 && fabs(terms[last]) <= 0.125 * DBL_EPSILON * size)
+    while (isfinite(size) && last > 0 && fabs(terms[last]) <= 0.125 * DBL_EPSILON * size)
         last--;
     return last;
 }
@@ -91,8 +91,8 @@ size_t engine_integrate_series(size_t n, size_t stride, double h, const double *
         of[0] += first;
         of[degree + 1] = of[degree + 2] = 0.0;
         for (size_t k = 1; k <= degree + 1; k++) {
-            double before = k == 1 ? 2.0 * of[0] : of[k - 1];
-            terms[k] = 0.25 * h * (before - of[k + 1]) / (double)k;
+            double before = k == 1 ? of[0] : 0.5 * of[k - 1];
+            terms[k] = 0.5 * h * (before - 0.5 * of[k + 1]) / (double)k;
         }
         size_t last = last_term(terms, degree + 1, fabs(x0[i]));
         n_terms = last >= n_terms ? last + 1 : n_terms;
