@@ -23,8 +23,8 @@
 #define LOOK_AHEAD_TIMES 1e6
 #define LOOK_AHEAD_EVENTS 1e3
 #define INSTANT_STEPS 1000
-/* A look ahead of one step of the solver goes no further than so many steps of the importer, and pays where the target
-   is no more than so many steps of the solver away. */
+/* A step of the solver that is read within goes no further than so many steps of the importer, since its interpolation
+   has the rounding of its ends; looking ahead of one pays where the target is no more than so many of them away. */
 #define STEPS_AHEAD 1000.0
 #define STEPS_BELOW 100.0
 

@@ -130,6 +130,7 @@ static bool follow_steps(Engine *engine, double target)
             return true;
         engine_clear_levels(engine, live);
         double limit = fmin(known, engine_next_time(engine, live, false, true));
+        limit = fmin(limit, *live->time + STEPS_AHEAD * (target - *live->time));
         if (*live->step > 0.0)
             limit = fmin(limit, *live->time + engine->method->segment_part * *live->step);
         if (!engine_step_begin(engine, live) || !engine_step_accept(engine, live, limit))
