@@ -78,7 +78,7 @@ def simulate(
         The engine in C, which runs maps that are compiled, or the readable one in Python, which runs any. Default: the
         native one wherever it can; `HybridArc.engine` says which ran and why.
     record : {"all", "events"}
-        What is kept: every step with its dense output, some ``8 * (3 + 6 * states)`` bytes each, or the jumps alone;
+        What is kept: every step with its dense output, some ``8 * (3 + 9 * states)`` bytes each, or the jumps alone;
         then the states between two jumps are not in the result.
 
     Returns

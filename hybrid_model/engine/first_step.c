@@ -3,9 +3,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "parts.h"
-
-#define ORDER 5.0
+#include "method.h"
 
 /* The largest element of a vector, or of its difference from another one. */
 static double largest_of(size_t n, const double *values, const double *minus)
@@ -78,7 +76,7 @@ bool engine_first_step(Engine *engine, const Point *point, double limit, double 
         return true;
     double reach = fmax(known ? size : 0.0, speed * euler);
     double allowed = scales->euler_part * engine->options.relative_tolerance * reach / speed;
-    double chosen = turned > 0.0 ? pow(allowed * turned, 1.0 / (ORDER + 1.0)) / turned : (double)INFINITY;
+    double chosen = turned > 0.0 ? pow(allowed * turned, 1.0 / (engine->method->order + 1.0)) / turned : (double)INFINITY;
     *h = fmax(least, fmin(fmin(scales->first_growth * euler, chosen), whole));
     return true;
 }

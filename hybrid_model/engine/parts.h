@@ -10,7 +10,7 @@
 #pragma GCC visibility push(hidden)
 #endif
 
-#define N_STAGES 7            /* most stages whose rates a method keeps */
+#define N_STAGES 16           /* most stages whose rates a method keeps */
 #define N_SAMPLES 9           /* of each margin, where a step is looked at for crossings */
 #define N_GAPS 8              /* gaps of each jump that must look geometric */
 #define N_ZENO_TIMES (N_GAPS + 1)

@@ -23,7 +23,7 @@ Counts = npt.NDArray[np.int64]
 
 _BEFORE_STATES = 3
 """Numbers in a row before those of the states."""
-_NESTED_VECTORS = 5
+_NESTED_VECTORS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,21 +138,23 @@ def interpolated(vectors: FloatArray, a: FloatArray | float) -> FloatArray:
 
     Parameters
     ----------
-    vectors : ndarray, shape (..., 5, states) or (..., k, states)
-        Five: the state at the start, its change, and three of its curvature (hybrid_model/engine/methods/dense.c). More: the
-        coefficients of a Chebyshev series (hybrid_model/engine/methods/chebyshev.c).
+    vectors : ndarray, shape (..., k, states)
+        Up to eight: the state at the start, its change, and more of its curvature (hybrid_model/engine/methods/dense.c). More
+        than that: the coefficients of a Chebyshev series (hybrid_model/engine/methods/chebyshev.c).
     a : float or ndarray, broadcast against (..., states)
         From 0 at the start of a step to 1 at its end.
     """
-    if vectors.shape[-2] == _NESTED_VECTORS:
+    if vectors.shape[-2] <= _NESTED_VECTORS:
         return _nested(vectors, a)
     return np.asarray(chebval(2.0 * np.asarray(a) - 1.0, np.moveaxis(vectors, -2, 0), tensor=False))
 
 
 def _nested(vectors: FloatArray, a: FloatArray | float) -> FloatArray:
     b = 1.0 - a
-    x0, change, d0, d1, d2 = (vectors[..., k, :] for k in range(5))
-    return np.asarray(x0 + a * (change + b * (d0 + a * (d1 + b * d2))))
+    found = np.zeros(())
+    for k in range(vectors.shape[-2] - 1, 0, -1):
+        found = (a if k % 2 else b) * (vectors[..., k, :] + found)
+    return np.asarray(vectors[..., 0, :] + found)
 
 
 @dataclass(frozen=True, eq=False)

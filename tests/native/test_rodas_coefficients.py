@@ -1,12 +1,12 @@
 """The coefficients of Rodas5P, read from the engine's C: order conditions over all rooted trees, and stability."""
 
 import functools
-import itertools
 import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from oracles.rooted_trees import density, size, trees
 
 import hybrid_model
 
@@ -36,36 +36,12 @@ def classical():
     return gamma, alpha, beta, lower + gammas[7], lower
 
 
-@functools.cache
-def trees(order):
-    """Rooted trees as sorted tuples of the trees at their root."""
-    if order == 1:
-        return [()]
-    found = set()
-    for first in range(1, order):
-        for tree, rest in itertools.product(trees(first), trees(order - first)):
-            found.add(tuple(sorted((tree, *rest))))
-    return sorted(found)
-
-
-def size(tree):
-    return 1 + sum(map(size, tree))
-
-
-def density(tree):
-    return size(tree) * int(np.prod([density(branch) for branch in tree]))
-
-
 def weight(tree):
     """Per stage: a single branch goes by beta, several by alpha (HW II, theorem IV.7.4)."""
     _, alpha, beta, *_ = classical()
     if len(tree) == 1:
         return beta @ weight(tree[0])
     return np.prod([alpha @ weight(branch) for branch in tree], axis=0) if tree else np.ones(8)
-
-
-def test_there_are_as_many_trees_as_known():
-    assert [len(trees(order)) for order in range(1, 7)] == [1, 1, 2, 4, 9, 20]
 
 
 @pytest.mark.parametrize("tree", [tree for order in range(1, 6) for tree in trees(order)], ids=str)

@@ -3,11 +3,12 @@
 
 void engine_interpolate_nested(const double *of, size_t n_terms, size_t n, double a, double *x)
 {
-    (void)n_terms;
     double b = 1.0 - a;
     for (size_t i = 0; i < n; i++) {
-        double inner = of[2 * n + i] + a * (of[3 * n + i] + b * of[4 * n + i]);
-        x[i] = of[i] + a * (of[n + i] + b * inner);
+        double inner = 0.0;
+        for (size_t k = n_terms; k-- > 1;)
+            inner = (k % 2 == 1 ? a : b) * (of[k * n + i] + inner);
+        x[i] = of[i] + inner;
     }
 }
 
@@ -16,7 +17,8 @@ void engine_straight_nested(const double *x0, const double *x1, size_t n, double
     for (size_t i = 0; i < n; i++) {
         of[i] = x0[i];
         of[n + i] = x1[i] - x0[i];
-        of[2 * n + i] = of[3 * n + i] = of[4 * n + i] = 0.0;
+        for (size_t k = 2; k < NESTED_VECTORS; k++)
+            of[k * n + i] = 0.0;
     }
 }
 

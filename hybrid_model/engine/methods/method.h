@@ -8,11 +8,9 @@
 #pragma GCC visibility push(hidden)
 #endif
 
-/* Of an interpolation that meets the step at both ends: x0 + a (c + b (d0 + a (d1 + b d2))) with a from 0 to 1 on the
-   step and b = 1 - a, after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I", II.6. */
-#define NESTED_VECTORS 5
-/* Its error is some ten times that of the step, and falls with the fifth power. */
-#define NESTED_SEGMENT_PART 0.35
+/* Of an interpolation that meets the step at both ends: x0 + a (c + b (d0 + a (d1 + b (d2 + ...)))) with a from 0 to 1 on
+   the step and b = 1 - a, after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I", II.6. */
+#define NESTED_VECTORS 8
 #define STAGES_OF_RODAS 8
 
 /* engine->step goes from (t0, x0), where its rates are in k[0].  The vectors of an interpolation lie one after the

@@ -4,9 +4,9 @@
    next ones.  A flow that was found to be stiff stays so: a run does not go back and forth between methods. */
 #include "method.h"
 
-/* In units of the fastest time scale Dormand-Prince 5(4) is stable up to 3.3, and the control of its steps keeps them
-   somewhat below; where accuracy decides about them, at tolerances of 1e-10 and less, they are below 0.1. */
-#define AT_BORDER 1.0
+/* In units of the fastest time scale Dormand-Prince 8(5, 3) is stable up to 6.1, about which the control of its steps
+   keeps them; where accuracy decides about them, at tolerances of 1e-10 and less, they are below 1.5. */
+#define AT_BORDER 3.0
 /* Twice before a run is given up for its pace, see PACE_STEPS in hybrid_model/scales.py. */
 #define STEPS_BETWEEN_LOOKS 1000
 #define SIGNS 15
