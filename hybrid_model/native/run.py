@@ -15,7 +15,7 @@ from hybrid_model.native.build.libraries import MODEL_SYMBOL, engine_library, mo
 from hybrid_model.record.row_flows import Rows
 from hybrid_model.record.run_record import RunStatistics
 
-_INTERFACE = 4
+_INTERFACE = 5
 """Of `run_interface` in exports.c."""
 
 _KINDS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER, Kind.OUTPUT)
@@ -110,6 +110,7 @@ def _engine() -> ctypes.CDLL:
         "run_statistics": (ctypes.POINTER(_Statistics), [engine]),
         "run_ending": (ctypes.c_int, [engine]),
         "run_shows_stiffness": (ctypes.c_int, [engine]),
+        "run_can_be_stiff": (ctypes.c_int, [engine]),
         "run_time": (number, [engine]),
         "run_message": (ctypes.c_char_p, [engine]),
         "run_free": (None, [engine]),
@@ -244,6 +245,11 @@ class NativeRun:
     def shows_stiffness(self) -> bool:
         """Whether the steps of an explicit method have shown that the flow is stiff."""
         return bool(self._library.run_shows_stiffness(self._engine))
+
+    @property
+    def can_be_stiff(self) -> bool:
+        """Whether there is a method for the flow if it is stiff."""
+        return bool(self._library.run_can_be_stiff(self._engine))
 
     @property
     def ending(self) -> Ending:

@@ -154,7 +154,18 @@ def require_supported(solver: Solver) -> None:
 
 
 def set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard, states: int) -> None:
-    """Give a run of so many states, which has not begun, its accuracy and what counts as an accumulation of jumps."""
+    """Give a run of so many states, which has not begun, its accuracy and what counts as an accumulation of jumps.
+
+    Raises
+    ------
+    TraceError
+        If the solver wants a method for stiff flows that there is none of for the model.
+    """
+    if solver.method in FOR_STIFF_FLOWS and not run.can_be_stiff:
+        raise TraceError(
+            f"the native engine has no method for a stiff flow of a network of {states} states, whose derivatives would be "
+            "a full matrix."
+        )
     fill_options(run.options, solver, zeno, states)
 
 

@@ -291,3 +291,25 @@ def test_quadratures_are_recorded_to_rounding_in_all_forms(tmp_path):
     assert [jump.x_before[0] for jump in events.jumps] == pytest.approx(
         [0.2 + integral(1.0) - integral(0.0), integral(2.0) - integral(1.0)], abs=2e-14
     )
+
+
+class Decay(hm.HybridAutomaton):
+    x = hm.State(1.0)
+
+    def flow_map(self, s):
+        return {"x": -1e3 * s.x}
+
+
+@pytest.mark.parametrize("parts", [40, 120])
+def test_a_network_steps_implicitly_where_it_can_and_says_where_it_cannot(parts):
+    network = hm.Composition("decays", {f"d{k}": Decay() for k in range(parts)}, {})
+    radau = hm.Solver(method="Radau", rtol=1e-6)
+    arc = hm.simulate(network, 1.0, solver=radau)
+    assert arc.end["d7.x"] == pytest.approx(0.0, abs=1e-6)
+    if parts == 40:
+        assert arc.engine.startswith("native")
+        assert arc.statistics.jacobians > 0
+    else:
+        assert arc.engine.startswith("python: the native engine has no method for a stiff flow of a network of 120 states")
+        with pytest.raises(hm.SimulationError, match="no method for a stiff flow"):
+            hm.simulate(network, 1.0, solver=radau, engine="native")

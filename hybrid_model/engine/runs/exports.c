@@ -13,7 +13,7 @@
 #endif
 
 /* Changes with every change of what follows, so that no process uses a library of another version. */
-#define RUN_INTERFACE 4
+#define RUN_INTERFACE 5
 
 /* What one event iteration gave: the jump that was taken (n_jumps if none), whether another one is due, whether the run
    is over, and when the next event comes (infinite if that is not known). */
@@ -43,6 +43,7 @@ EXPORT const double *run_rows(const Engine *engine, int kind, size_t *count, siz
 EXPORT const Statistics *run_statistics(const Engine *engine);
 EXPORT int run_ending(const Engine *engine);
 EXPORT int run_shows_stiffness(const Engine *engine);
+EXPORT int run_can_be_stiff(const Engine *engine);
 EXPORT double run_time(const Engine *engine);
 EXPORT const char *run_message(const Engine *engine);
 EXPORT void run_free(Engine *engine);
@@ -187,6 +188,13 @@ int run_ending(const Engine *engine)
 int run_shows_stiffness(const Engine *engine)
 {
     return engine->status->is_stiff;
+}
+
+/* Whether there is a method for the flow if it is stiff. */
+int run_can_be_stiff(const Engine *engine)
+{
+    const Model *m = engine->model;
+    return m->n_states == 0 || m->quadratures > 0 || engine->implicit.jacobian;
 }
 
 double run_time(const Engine *engine)
