@@ -68,11 +68,11 @@ class NativeBlock(Block):
         check: Callable[[], None],
     ) -> None:
         require_supported(solver)
-        self.name, self._automaton = name, automaton
-        model = model_of(automaton, check, stiff=solver.method in FOR_STIFF_FLOWS)
-        self._run, self._jumps = NativeRun(model), len(model.jumps)
+        self.name, self._automaton, self._check = name, automaton, check
         layout = inputs.layout
-        set_options(self._run, solver, zeno, layout.sizes[Kind.STATE])
+        self._solver, self._zeno, self._states = solver, zeno, layout.sizes[Kind.STATE]
+        self._run = self._made(stiff=solver.method in FOR_STIFF_FLOWS)
+        self._jumps = len(self._run.model.jumps)
         parameters = inputs.parameters_at(span[0])
         self._run.place([layout.start(Kind.STATE), layout.start(Kind.DISCRETE), inputs.held, parameters], *span)
         self._places = {element: (kind, k) for kind in Kind for k, element in enumerate(layout.names(kind))}
@@ -124,6 +124,8 @@ class NativeBlock(Block):
             )
         advance = Advance.PAUSED
         while advance is Advance.PAUSED:
+            if self._run.shows_stiffness and not self._run.model.stiff:
+                self._take_derivatives()
             advance = self._run.step(t_next, inside=not self._events)
         there = advance in (Advance.REACHED, Advance.EVENT_AT_TARGET)
         self._t = t_next if there else min(self._run.time, t_next)
@@ -141,6 +143,17 @@ class NativeBlock(Block):
 
     def release(self, state: Any) -> None:
         """See `Block.release`."""
+
+    def _made(self, *, stiff: bool) -> NativeRun:
+        run = NativeRun(model_of(self._automaton, self._check, stiff=stiff))
+        set_options(run, self._solver, self._zeno, self._states)
+        return run
+
+    def _take_derivatives(self) -> None:
+        """Go on from where the run is with what a method for stiff flows needs: all that evolves is laid out alike."""
+        block = self._run.save()
+        self._run = self._made(stiff=True)
+        self._run.restore(block)
 
     def _termination(self) -> Termination:
         self._require_ending_of_the_run()
