@@ -163,8 +163,8 @@ def set_options(run: NativeRun, solver: Solver, zeno: ZenoGuard, states: int) ->
     """
     if solver.method in FOR_STIFF_FLOWS and not run.can_be_stiff:
         raise TraceError(
-            f"the native engine has no method for a stiff flow of a network of {states} states, whose derivatives would be "
-            "a full matrix."
+            f"the native engine has no method for a stiff flow of a network of {states} states, whose derivatives "
+            "would be a full matrix."
         )
     fill_options(run.options, solver, zeno, states)
 

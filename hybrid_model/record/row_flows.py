@@ -139,8 +139,9 @@ def interpolated(vectors: FloatArray, a: FloatArray | float) -> FloatArray:
     Parameters
     ----------
     vectors : ndarray, shape (..., k, states)
-        Up to eight: the state at the start, its change, and more of its curvature (hybrid_model/engine/methods/dense.c). More
-        than that: the coefficients of a Chebyshev series (hybrid_model/engine/methods/chebyshev.c).
+        Up to eight: the state at the start, its change, and more of its curvature
+        (hybrid_model/engine/methods/dense.c). More than that: the coefficients of a Chebyshev series
+        (hybrid_model/engine/methods/chebyshev.c).
     a : float or ndarray, broadcast against (..., states)
         From 0 at the start of a step to 1 at its end.
     """

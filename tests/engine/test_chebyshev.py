@@ -135,7 +135,7 @@ def test_constant_and_linear_rates_leave_few_terms_and_no_rounding(series):
 
 
 def test_what_overflows_is_not_dropped(series):
-    """A rate near the largest float: over a short step it is integrated, and what it leads to beyond floats is infinite."""
+    """A rate near the largest float: over a short step it is integrated, and beyond floats it leads to infinity."""
     constant, x0 = np.full((FINEST + 1, 1), 1e308), np.zeros(1)
     n_terms, found, _ = series.integrated(2, 0.5, x0, constant)
     assert series.at_end(found, n_terms, x0)[0] == 0.5e308

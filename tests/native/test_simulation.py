@@ -310,6 +310,8 @@ def test_a_network_steps_implicitly_where_it_can_and_says_where_it_cannot(parts)
         assert arc.engine.startswith("native")
         assert arc.statistics.jacobians > 0
     else:
-        assert arc.engine.startswith("python: the native engine has no method for a stiff flow of a network of 120 states")
+        assert arc.engine.startswith(
+            "python: the native engine has no method for a stiff flow of a network of 120 states"
+        )
         with pytest.raises(hm.SimulationError, match="no method for a stiff flow"):
             hm.simulate(network, 1.0, solver=radau, engine="native")
