@@ -235,7 +235,7 @@ class Wheels(hm.HybridAutomaton):
     wheels = hm.Dimension()
     a = hm.State(1.0, shape="wheels")
     b = hm.State(0.0, shape="wheels")
-    rate = hm.Parameter(1.0, shape="wheels")
+    rate = hm.Parameter(20.0, shape="wheels")
     rings = hm.DiscreteState(0, integer=True, output=True)
     bell = hm.Clock("jump")
 
