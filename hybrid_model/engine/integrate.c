@@ -9,6 +9,11 @@
 /* A step that costs the same however long it is goes so many times as far as the flow before the last jump went: most
    next events are within it, and not far from its start. */
 #define BEYOND_NEXT 2.0
+/* No step is shorter than so many floats of time.  Across a jump of the rates its error is what those floats leave open,
+   and up to so many tolerances it counts as none: a state near zero has small ones.  What is smooth but too fast for such
+   a step has an error of the order of the state, 1e13 tolerances. */
+#define SHORTEST 16.0
+#define LEFT_OPEN 1e6
 
 bool engine_step_begin(Engine *engine, const Point *point)
 {
@@ -75,7 +80,7 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
 {
     Step *step = &engine->step;
     const Method *method = engine->method;
-    double t0 = *point->time, remaining = limit - t0, h = *point->step;
+    double t0 = *point->time, remaining = limit - t0, h = *point->step, shortest = SHORTEST * engine_time_ulp(t0);
     bool rejected = false;
     if (h <= 0.0 && !length_after_jump(engine, point, limit, &h))
         return false;
@@ -91,8 +96,8 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
         step->n_windows = 1;
         if (!method->trial(engine, point, &error))
             return false;
-        if (error <= 1.0) {
-            *point->step = next_step(method, h, used, error, rejected);
+        if (error <= 1.0 || (used <= shortest && error <= LEFT_OPEN)) {
+            *point->step = error <= 1.0 ? next_step(method, h, used, error, rejected) : used;
             step->has_vectors = false;
             engine->statistics.steps++;
             engine_watch_stiffness(engine, point);
@@ -101,12 +106,16 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
         h = used * (isfinite(error) ? fmax(0.1, 0.9 * pow(error, -1.0 / method->order)) : 0.1);
         rejected = true;
         engine->statistics.rejected++;
-        if (h >= 16.0 * engine_time_ulp(t0) && t0 + h > t0)
+        if (h >= shortest && t0 + h > t0)
             continue;
-        if (!isfinite(error) || !engine_raise_floor(engine, point, limit))
+        if (isfinite(error) && engine_raise_floor(engine, point, limit)) {
+            if (!engine_first_step(engine, point, limit, engine_largest_state(engine, point, point->x), &h))
+                return false;
+        } else if (isfinite(error) && used > shortest) {
+            h = shortest;
+        } else {
             return step_too_small(engine, point, h, isfinite(error));
-        if (!engine_first_step(engine, point, limit, engine_largest_state(engine, point, point->x), &h))
-            return false;
+        }
     }
 }
 

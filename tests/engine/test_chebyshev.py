@@ -125,6 +125,15 @@ def test_a_square_of_a_sine_is_integrated_to_rounding_and_its_tail_says_so(serie
         assert max(errors) <= max(tails[0], 1e-15)
 
 
+def test_rates_that_jump_to_and_fro_show_even_where_the_last_two_terms_vanish(series):
+    rates = np.zeros((FINEST + 1, 1))
+    rates[::2, 0] = [-1, -1, 1, 1, -1, 1, 1, -1, -1]
+    fitted = chebyshev.chebfit(2 * series.nodes[::2] - 1, rates[::2, 0], FINEST // 2)
+    assert np.abs(fitted[-2:]).max() < 1e-15
+    _, _, tails = series.integrated(2, 0.2, np.zeros(1), rates)
+    assert tails[0] > 1e-3
+
+
 def test_constant_and_linear_rates_leave_few_terms_and_no_rounding(series):
     constant, linear = np.full(FINEST + 1, 0.3), 0.5 * series.nodes
     n_terms, found, tails = series.integrated(2, 0.7, np.array([1.1, 0.0]), np.stack([constant, linear], axis=1))

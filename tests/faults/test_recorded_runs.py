@@ -110,39 +110,40 @@ def test_its_place_is_there(fault):
     assert SOURCES[file].read_text().count(old) == 1
 
 
+SCRIPT = """
+import sys
+sys.path[:] = sys.argv[2:]
+import test_recorded_runs as here
+from hybrid_model.native import run, simulation
+run.engine_library = lambda: sys.argv[1]
+simulation.STEPS_AT_ONCE = 7
+print("begins", flush=True)
+here.recorded_runs_are_right()
+"""
+
+
+def in_its_own_process(path, **environment):
+    """A fault may end the process."""
+    command = ["env", *(f"{key}={value}" for key, value in environment.items()), sys.executable, "-c", SCRIPT]
+    done = subprocess.run([*command, str(path), *sys.path], capture_output=True, text=True, timeout=300, check=False)
+    assert done.stdout == "begins\n", done.stderr
+    return done
+
+
 @pytest.mark.faults
 @pytest.mark.parametrize("fault", FAULTS)
 def test_killed(fault, tmp_path):
-    """In a process of its own, since a fault may end it."""
-    path = built(tmp_path, "changed", FAULTS[fault])
-    script = (
-        "import sys, test_recorded_runs as here; from hybrid_model.native import run, simulation; "
-        "run.engine_library = lambda: sys.argv[1]; simulation.STEPS_AT_ONCE = 7; here.recorded_runs_are_right()"
-    )
-    done = subprocess.run([sys.executable, "-c", script, str(path)], capture_output=True, timeout=60, check=False)
-    assert done.returncode != 0
+    assert in_its_own_process(built(tmp_path, "changed", FAULTS[fault])).returncode != 0
 
 
 @pytest.mark.faults
 @pytest.mark.skipif(sys.platform != "linux", reason="LD_PRELOAD")
 def test_under_sanitizers(tmp_path):
-    flags = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
-    path = built(tmp_path, "sanitized", None, flags)
-    script = (
-        "import sys, test_recorded_runs as here; from hybrid_model.native import run, simulation; "
-        "run.engine_library = lambda: sys.argv[1]; simulation.STEPS_AT_ONCE = 7; here.recorded_runs_are_right()"
+    path = built(
+        tmp_path, "sanitized", None, ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
     )
     preload = ":".join(map(library, ("libasan.so", "libubsan.so")))
-    environment = {"LD_PRELOAD": preload, "ASAN_OPTIONS": "detect_leaks=0"}
-    command = [
-        "env",
-        *(f"{key}={value}" for key, value in environment.items()),
-        sys.executable,
-        "-c",
-        script,
-        str(path),
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = in_its_own_process(path, LD_PRELOAD=preload, ASAN_OPTIONS="detect_leaks=0")
     assert (done.returncode, done.stderr) == (0, "")
 
 

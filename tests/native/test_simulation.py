@@ -315,3 +315,28 @@ def test_a_network_steps_implicitly_where_it_can_and_says_where_it_cannot(parts)
         )
         with pytest.raises(hm.SimulationError, match="no method for a stiff flow"):
             hm.simulate(network, 1.0, solver=radau, engine="native")
+
+
+class SquareWave(hm.HybridAutomaton):
+    """A rate that changes its sign twice a period, which nobody has declared."""
+
+    x = hm.State(0.025)
+
+    def flow_map(self, s):
+        return {"x": np.sign(np.sin(20.0 * np.pi * s.t))}
+
+
+class SquareWaveOfState(SquareWave):
+    """The same of a phase, and no quadrature: x has a part in its own rate."""
+
+    phase = hm.State(0.025)
+
+    def flow_map(self, s):
+        return {"phase": 1.0, "x": np.sign(np.sin(20.0 * np.pi * s.phase)) - 1e-14 * s.x}
+
+
+@pytest.mark.parametrize("automaton", [SquareWave(), SquareWaveOfState()], ids=lambda automaton: automaton.name)
+def test_jumps_of_rates_are_passed_where_floats_of_time_are_coarse(automaton):
+    """From t = 64 s on a float of time is 1.4e-14 s: a jump of the rate by 2 leaves 3e-14 of the state open."""
+    arc = hm.simulate(automaton, 70.05, t_start=64.025, engine="native")
+    assert arc.end.x == pytest.approx(0.05, abs=1e-10)

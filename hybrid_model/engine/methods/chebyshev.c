@@ -4,6 +4,9 @@
 
 #include "chebyshev.h"
 
+/* Terms of smooth rates fall from one to the next by no more than that, where a step is as long as they allow. */
+#define FALLS 0.03
+
 /* cos(pi m / FINEST) for m from 0 to FINEST. */
 static const double COSINE[N_NODES] = {
     1.0, 0.9807852804032304, 0.9238795325112867, 0.8314696123025452, 0.7071067811865476, 0.5555702330196022,
@@ -74,6 +77,18 @@ static size_t last_term(const double *terms, size_t last, double size)
     return last;
 }
 
+/* The last two terms; those of rates that jump to and fro may both be zero, where some before them are larger than
+   those of smooth rates can be. */
+static double tail(const double *terms, size_t degree)
+{
+    double size = fabs(terms[degree - 1]) + fabs(terms[degree]), weight = 1.0;
+    for (size_t k = degree - 1; k-- > degree / 2;) {
+        weight *= FALLS;
+        size = fmax(size, weight * fabs(terms[k]));
+    }
+    return size;
+}
+
 size_t engine_integrate_series(size_t n, size_t stride, double h, const double *x0, const double *rates, double *states,
                                double *tails)
 {
@@ -102,7 +117,7 @@ size_t engine_integrate_series(size_t n, size_t stride, double h, const double *
         states[i] = constant;
         for (size_t k = 1; k < N_SERIES; k++)
             states[k * n + i] = k <= last ? terms[k] : 0.0;
-        tails[i] = 0.5 * fabs(h) * (fabs(of[degree - 1]) + fabs(of[degree]));
+        tails[i] = 0.5 * fabs(h) * tail(of, degree);
     }
     return n_terms;
 }

@@ -5,8 +5,8 @@
 #include "method.h"
 
 /* In units of the fastest time scale Dormand-Prince 8(5, 3) is stable up to 6.1, about which the control of its steps
-   keeps them; where accuracy decides about them, at tolerances of 1e-10 and less, they are below 1.5. */
-#define AT_BORDER 3.0
+   keeps them; where accuracy decides about them, at tolerances of 1e-10 and less, they are mostly below 1. */
+#define AT_BORDER 1.5
 /* Twice before a run is given up for its pace, see PACE_STEPS in hybrid_model/scales.py. */
 #define STEPS_BETWEEN_LOOKS 1000
 #define SIGNS 15
