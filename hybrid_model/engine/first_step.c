@@ -76,7 +76,8 @@ bool engine_first_step(Engine *engine, const Point *point, double limit, double 
         return true;
     double reach = fmax(known ? size : 0.0, speed * euler);
     double allowed = scales->euler_part * engine->options.relative_tolerance * reach / speed;
-    double chosen = turned > 0.0 ? pow(allowed * turned, 1.0 / (engine->method->order + 1.0)) / turned : (double)INFINITY;
+    double root = 1.0 / (engine->method->order + 1.0);
+    double chosen = turned > 0.0 ? pow(allowed * turned, root) / turned : (double)INFINITY;
     *h = fmax(least, fmin(fmin(scales->first_growth * euler, chosen), whole));
     return true;
 }

@@ -9,9 +9,9 @@
 /* A step that costs the same however long it is goes so many times as far as the flow before the last jump went: most
    next events are within it, and not far from its start. */
 #define BEYOND_NEXT 2.0
-/* No step is shorter than so many floats of time.  Across a jump of the rates its error is what those floats leave open,
-   and up to so many tolerances it counts as none: a state near zero has small ones.  What is smooth but too fast for such
-   a step has an error of the order of the state, 1e13 tolerances. */
+/* No step is shorter than so many floats of time.  Across a jump of the rates its error is what those floats leave
+   open, and up to so many tolerances it counts as none: a state near zero has small ones.  What is smooth but too fast
+   for such a step has an error of the order of the state, 1e13 tolerances. */
 #define SHORTEST 16.0
 #define LEFT_OPEN 1e6
 

@@ -26,8 +26,8 @@ double engine_node(size_t j);
 /* The integral from x0, in `states` (N_SERIES vectors), of the polynomial through the rates at each `stride`th node of
    a step of h; `rates` holds N_NODES vectors.  Returns the number of its terms, behind which there are zeros: what no
    state shows is dropped.  Returns in `tails` (one vector) the size of the integrals of the last two terms of the
-   rates, without what cancels in them, or of a part of those before: far more than is neglected where coefficients fall,
-   and about as much where the rates have a kink or jump. */
+   rates, without what cancels in them, or of a part of those before: far more than is neglected where coefficients
+   fall, and about as much where the rates have a kink or jump. */
 size_t engine_integrate_series(size_t n, size_t stride, double h, const double *x0, const double *rates, double *states,
                                double *tails);
 /* Values of a series at each `stride`th node but the first. */

@@ -1,16 +1,16 @@
 /* Dormand-Prince 8(5, 3) with its interpolation of order 7: the method for flows of which nothing more is known.
 
    P. J. Prince, J. R. Dormand, "High order embedded Runge-Kutta formulae", 1981; the error estimate and the
-   interpolation after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I", sections II.5 and
-   II.6 ("DOP853").  At the tolerances of the engine its steps are some ten times as long as those of order 5. */
+   interpolation after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I", sections II.5
+   and II.6 ("DOP853").  At the tolerances of the engine its steps are some ten times as long as those of order 5. */
 #include "dormand_prince.h"
 
 #include <math.h>
 
 #include "method.h"
 
-/* Steps are few and long, so their errors add up and do not cancel as those of many do: they are taken for so many times
-   as large, which makes steps a fifth shorter. */
+/* Steps are few and long, so their errors add up and do not cancel as those of many do: they are taken for so many
+   times as large, which makes steps a fifth shorter. */
 #define STRICTER 4.0
 
 /* Where in step->k the rates of a stage are: those at the end come last, as with all methods. */
@@ -50,8 +50,8 @@ static bool stages(Engine *engine, const double *z, double t1, double *const *k,
     return true;
 }
 
-/* The error of the step in units of the tolerance, infinite if anything is not finite: the difference to the solution of
-   order 5, made smaller where that to the one of order 3 shows by how much orders differ. */
+/* The error of the step in units of the tolerance, infinite if anything is not finite: the difference to the solution
+   of order 5, made smaller where that to the one of order 3 shows by how much orders differ. */
 static double step_error(Engine *engine, const Point *point, double h)
 {
     const Step *step = &engine->step;

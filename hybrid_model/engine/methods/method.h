@@ -8,8 +8,9 @@
 #pragma GCC visibility push(hidden)
 #endif
 
-/* Of an interpolation that meets the step at both ends: x0 + a (c + b (d0 + a (d1 + b (d2 + ...)))) with a from 0 to 1 on
-   the step and b = 1 - a, after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I", II.6. */
+/* Of an interpolation that meets the step at both ends: x0 + a (c + b (d0 + a (d1 + b (d2 + ...)))) with a from 0 to 1
+   on the step and b = 1 - a, after E. Hairer, S. P. Norsett, G. Wanner, "Solving Ordinary Differential Equations I",
+   section II.6. */
 #define NESTED_VECTORS 8
 #define STAGES_OF_RODAS 8
 
