@@ -1,5 +1,6 @@
 /* The coefficients of dormand_prince.c, as E. Hairer, S. P. Norsett, G. Wanner give them: "Solving Ordinary
-   Differential Equations I", 2nd edition, section II.5 (the step and its two estimates) and II.6 (the interpolation). */
+   Differential Equations I", 2nd edition, section II.5 (the step and its two estimates) and II.6 (the
+   interpolation). */
 #ifndef HYBRID_DORMAND_PRINCE_H
 #define HYBRID_DORMAND_PRINCE_H
 
