@@ -69,7 +69,8 @@ static double step_error(Engine *engine, const Point *point, double h)
         }
         third = fmax(third, fabs(h * weigh(step->k, THIRD, STEP_STAGES, i)) / scale);
     }
-    return fifth > 0.0 ? STRICTER * fifth * (fifth / hypot(fifth, 0.1 * third)) : 0.0;
+    double ratio = fifth > 0.0 ? 0.1 * third / fifth : 0.0;
+    return STRICTER * fifth / sqrt(1.0 + ratio * ratio);
 }
 
 /* The stages that the interpolation needs besides; not finite rates there make an infinite error. */
