@@ -151,6 +151,9 @@ bool engine_advance_quietly(Engine *engine, double target);
    the limit if nothing happens before.  False if that is not ahead.  The state there is kept, and
    engine_advance takes it from there. */
 bool engine_predict(Engine *engine, double limit, double *event_time);
+/* The same for whoever comes back to times before that event: where the interpolation of a step is the step itself, the
+   first step is kept for them. */
+bool engine_look_ahead(Engine *engine, double limit, double *event_time);
 /* Whether the last prediction, still valid, is of an event. */
 bool engine_foresees(const Engine *engine);
 /* The earliest time event after now; breakpoints of the flow only if asked for. */

@@ -30,18 +30,30 @@ static double look_ahead_limit(Engine *engine)
     return now + (span > LOOK_AHEAD_TIMES * DBL_MIN ? span : LOOK_AHEAD_TIMES);
 }
 
-bool engine_predict(Engine *engine, double limit, double *event_time)
+/* Until when nothing happens where what is known ends at `known`, maybe with an event: a guard that is crossed a little
+   behind a target may count as reached with it. */
+static double quiet_until(const Engine *engine, double known)
+{
+    return known - fmax(4.0 * engine_time_ulp(known), engine_one_instant(engine, known));
+}
+
+/* Looks ahead over so many steps; with `keep` the live point then moves along the first of them. */
+static bool look_ahead(Engine *engine, double limit, size_t budget, bool keep, double *event_time)
 {
     Status *status = engine->status;
     double now = *engine->live.time;
-    size_t budget = look_ahead_steps(engine);
     engine_leave_segment(engine);
     status->prediction = PREDICTION_NONE;
     if (status->ending != ENDED_NOT)
         return false;
     double horizon = isfinite(limit) ? limit : look_ahead_limit(engine);
+    /* Along a step there is no breakpoint, so those that are due come before it. */
+    engine->keeps = keep && engine->method->is_exact && engine_take_internal_jumps(engine, &engine->live);
     engine_copy_point(engine, &engine->live, &engine->predicted);
     FlowEnd end = engine_flow(engine, &engine->predicted, fmin(limit, horizon), true, &budget);
+    engine->keeps = false;
+    if (status->has_segment)
+        status->segment_quiet = fmin(status->segment_end, quiet_until(engine, *engine->predicted.time));
     bool renew = end == FLOW_BUDGET || (end == FLOW_REACHED && limit > horizon);
     /* A problem ahead is reported when its time is reached; it may never be, if an input changes. */
     status->prediction = end == FLOW_EVENT ? PREDICTION_EVENT : renew ? PREDICTION_RENEWAL : PREDICTION_QUIET;
@@ -50,16 +62,19 @@ bool engine_predict(Engine *engine, double limit, double *event_time)
     return *event_time > now;
 }
 
+bool engine_predict(Engine *engine, double limit, double *event_time)
+{
+    return look_ahead(engine, limit, look_ahead_steps(engine), false, event_time);
+}
+
+bool engine_look_ahead(Engine *engine, double limit, double *event_time)
+{
+    return look_ahead(engine, limit, look_ahead_steps(engine), true, event_time);
+}
+
 bool engine_foresees(const Engine *engine)
 {
     return engine->model->predictable && engine->status->prediction == PREDICTION_EVENT;
-}
-
-/* Until when nothing happens where what is known ends at `known`, maybe with an event: a guard that is crossed a little
-   behind a target may count as reached with it. */
-static double quiet_until(const Engine *engine, double known)
-{
-    return known - fmax(4.0 * engine_time_ulp(known), engine_one_instant(engine, known));
 }
 
 static void keep_segment(Engine *engine, double known)

@@ -30,7 +30,7 @@ from hybrid_model.zeno_guard import ZenoGuard
 
 EVENTS_AT_ONCE = 20_000
 """After so many events a run comes back: what has happened is kept elsewhere, and it can be interrupted."""
-STEPS_AHEAD = 2
+STEPS_AHEAD = 1
 """Of the solver, in one look ahead of a part: what lies beyond is looked at when the time comes, for an input may have
 changed by then."""
 _STOPS = {Ending.ZENO: Stop.ZENO, Ending.BLOCKED: Stop.BLOCKED, Ending.JUMPS: Stop.JUMPS}

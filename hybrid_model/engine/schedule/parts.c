@@ -109,7 +109,7 @@ void schedule_predict(Schedule *schedule, uint32_t i)
         return;
     }
     Engine *engine = schedule_at(schedule, i);
-    bool ahead = engine_predict(engine, schedule->stop, &next);
+    bool ahead = engine_look_ahead(engine, schedule->stop, &next);
     if (needs_another_method(schedule, i))
         return;
     Prediction found = (Prediction)engine->status->prediction;
