@@ -158,10 +158,13 @@ class TestVariantsDifferFromScenarioAInOnePoint:
         assert (other.network, other.weights, other.trigger) == (paper.network, paper.weights, paper.trigger)
 
 
-def test_every_example_on_the_page_about_scenario_files_is_read():
-    page = (DOCS / "scenarios.md").read_text(encoding="utf-8")
+@pytest.mark.parametrize(("name", "count"), [("scenarios", 11), ("triggers", 2)])
+def test_every_example_on_the_pages_about_scenario_files_is_read(name, count, tmp_path):
+    page = (DOCS / f"{name}.md").read_text(encoding="utf-8")
+    for file, code in re.findall(r"```python\n# (\w+\.py)\n(.*?)```", page, flags=re.DOTALL):
+        (tmp_path / file).write_text(code, encoding="utf-8")
     examples = [tomllib.loads(text) for text in re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)]
-    assert len(examples) >= 11
+    assert len(examples) >= count
     for example in examples:
         entries = {
             "name": "example",
@@ -170,4 +173,4 @@ def test_every_example_on_the_page_about_scenario_files_is_read():
             "weights": {"kind": "constant", "value": 1.0},
             "trigger": {"kind": "static", "threshold": 0.2},
         }
-        assert closed_loop(read_scenario(entries | example)).parts
+        assert closed_loop(read_scenario(entries | example, tmp_path)).parts
