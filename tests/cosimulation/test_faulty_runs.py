@@ -133,11 +133,18 @@ def test_an_input_is_read_once_however_often_it_is_sent():
     assert slaves[1].reads == 2
 
 
+INTERRUPTIBLE = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from cosim.cli.main import main; raise SystemExit(main())"
+)
+"""The command line, also where the tests were begun in the background of a shell, which lets interrupts be ignored."""
+
+
 def begun(path, table, tmp_path):
     """Start a run that takes long, in a folder for temporary files of its own; return it when there are rows."""
     places = tmp_path / "temporary"
     places.mkdir()
-    command = [sys.executable, "-m", "cosim.cli.main", "cosim", str(path), "--output-file", str(table)]
+    command = [sys.executable, "-c", INTERRUPTIBLE, "cosim", str(path), "--output-file", str(table)]
     run = subprocess.Popen(command, env={**os.environ, "TMPDIR": str(places)}, stderr=subprocess.PIPE, text=True)
     began = time.monotonic()
     while not (table.exists() and table.stat().st_size > 5000):
@@ -147,14 +154,24 @@ def begun(path, table, tmp_path):
     return run, places
 
 
+def stopped(run, sent):
+    """Send a signal until the run ends, and return what it says: an interrupt can be lost, and people press again."""
+    for _ in range(6):
+        run.send_signal(sent)
+        try:
+            return run.communicate(timeout=10.0)[1]
+        except subprocess.TimeoutExpired:
+            continue
+    raise AssertionError("the run goes on after six signals")
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.parametrize(("sent", "status"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
 def test_a_run_that_is_stopped_leaves_rows_and_no_folders(sent, status, stranger, tmp_path):
     path = stranger(events=False, experiment='stopTime="1000" stepSize="1e-4"')
     table = tmp_path / "out.csv"
     run, places = begun(path, table, tmp_path)
-    run.send_signal(sent)
-    error = run.communicate(timeout=30.0)[1]
+    error = stopped(run, sent)
     assert run.returncode == status
     with table.open(newline="") as file:
         rows = list(csv.reader(file))
