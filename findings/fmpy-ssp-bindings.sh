@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # fmpy's simulate_ssp leaves out the parameter bindings that a system structure holds.
 #
-# A component in SystemStructure.ssd has a ParameterBinding with a value for a parameter of its FMU (SSP 1.0, section
-# 4.4.3). A good engineer expects a run of the file as it is to take that value, for the binding is part of the system.
+# A component in SystemStructure.ssd has a ParameterBinding with a value for a parameter of its FMU. A good
+# engineer expects a run of the file as it is to take that value, for the binding is part of the system.
 # fmpy reads the binding, lists it on the component, and runs with the FMU's own start value, without a word; only a
 # parameter set handed over as an argument is applied. Who is hurt: everybody who is sent an .ssp and runs it to see
 # whether it does what its author says, and whoever writes parameters as bindings, as the standard has them.

@@ -2,8 +2,8 @@
 # fmpy's simulate_ssp makes the first step of a system with zeros at all inputs, whatever the sources give at the start.
 #
 # One FMU gives 5 at all times, another integrates its input; their connection is all there is. A good engineer expects
-# 5 after 1 s: FMI's initialization mode is there so that outputs at the start reach inputs before the first step (FMI
-# 2.0.5, section 4.2.4, computational flow). fmpy leaves initialization mode of each FMU before it reads an output, and
+# 5 after 1 s: FMI's initialization mode is there so that outputs at the start reach inputs before the first step.
+# fmpy leaves initialization mode of each FMU before it reads an output, and
 # begins with 0 on every connection; so the integral is short by one step, and a system that would stay where it is
 # is pushed away by its first step. Who is hurt: everybody who takes fmpy's run of an .ssp for a reference; the error goes
 # with the step, but no setting makes it go away.

@@ -3,10 +3,12 @@
 import difflib
 import enum
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, TypeVar
 
 from hybrid_model.consensus.messages import ScenarioError, shown
-from hybrid_model.named_objects import is_target
+from hybrid_model.errors import ImportFailedError, NamingError
+from hybrid_model.named_objects import imports_from, is_target, named_object
 
 __all__ = ["Entries", "suggestion"]
 
@@ -63,6 +65,15 @@ class Entries:
         """The value of a key if it names an object of the user's, as ``file.py:Name`` does; otherwise None."""
         value = self._given.get(key)
         return value if isinstance(value, str) and is_target(value) else None
+
+    def named(self, key: str, folder: Path) -> Any:
+        """The object that the value of `target` names, its file counted from `folder`; imports it, or ScenarioError."""
+        target = self.text(key)
+        try:
+            with imports_from(str(folder / target)):
+                return named_object(target, folder)
+        except (NamingError, ImportFailedError) as error:
+            raise ScenarioError(f"{self.name} {key}: {error}") from error
 
     def lists(self, key: str) -> bool:
         """Whether the key is given, as a list."""

@@ -200,9 +200,8 @@ def _read_switching(top: Entries, network: Network, stop_time: float) -> Switchi
 def _read_trigger(top: Entries, folder: Path) -> Trigger:
     # The kind decides which keys are known, so it is read from a table that accepts whatever is given.
     any_kind = _subtable(top, "trigger", None)
-    target = any_kind.target("kind")
-    if target is not None:
-        return read_own_trigger(any_kind, target, folder)
+    if any_kind.target("kind") is not None:
+        return read_own_trigger(any_kind, folder)
     kind = any_kind.choice("kind", TriggerKind)
     defaults = trigger_keys(kind)
     table = _subtable(top, "trigger", ("kind", *defaults))

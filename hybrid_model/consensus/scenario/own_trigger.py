@@ -12,8 +12,7 @@ from hybrid_model.consensus.entries import Entries, suggestion
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.trigger import Threshold, Trigger, TriggerKind
 from hybrid_model.declare.variables import Kind, Values
-from hybrid_model.errors import DeclarationError, ImportFailedError, NamingError
-from hybrid_model.named_objects import imports_from, named_object
+from hybrid_model.errors import DeclarationError
 
 __all__ = ["OwnTrigger", "read_own_trigger"]
 
@@ -138,15 +137,14 @@ class OwnTrigger(Trigger):
         return promised
 
 
-def read_own_trigger(table: Entries, target: str, folder: Path) -> OwnTrigger:
+def read_own_trigger(table: Entries, folder: Path) -> OwnTrigger:
     """Read the table ``[trigger]`` whose kind names a class; its other keys are values of that class.
 
     Parameters
     ----------
     table : Entries
-        Everything that is given.
-    target : str
-        ``file.py:ClassName``, the file counted from `folder`, or ``module:ClassName``.
+        Everything that is given; ``kind`` is ``file.py:ClassName``, the file counted from `folder`, or
+        ``module:ClassName``.
     folder : Path
         Folder of the scenario file.
 
@@ -155,10 +153,5 @@ def read_own_trigger(table: Entries, target: str, folder: Path) -> OwnTrigger:
     ScenarioError
         If the class cannot be found or imported, or a value is not possible.
     """
-    try:
-        with imports_from(str(folder / target)):
-            law: Any = named_object(target, folder)
-    except (NamingError, ImportFailedError) as error:
-        raise ScenarioError(f"[trigger] kind: {error}") from error
     values = {key: table.numbers(key) if table.lists(key) else table.number(key) for key in table if key != "kind"}
-    return OwnTrigger(law=law, values=values)
+    return OwnTrigger(law=table.named("kind", folder), values=values)

@@ -72,9 +72,8 @@ def read_weights(
     """
     # The kind decides which keys are known, so it is read from a table that accepts whatever is given.
     anything = make_entries(None)
-    target = anything.target("kind")
-    if target is not None:
-        return read_own_weights(anything, target, edges, folder)
+    if anything.target("kind") is not None:
+        return read_own_weights(anything, edges, folder)
     any_kind = make_entries(tuple(dict.fromkeys(key for kind in WeightKind for key in kind.keys)))
     kind = any_kind.choice("kind", WeightKind)
     return kind.waveform.read(make_entries(kind.keys), edges, folder)

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.weights.function import FunctionWeight
-from hybrid_model.errors import ImportFailedError, NamingError
-from hybrid_model.named_objects import imports_from, named_object
 
 __all__ = ["read_own_weights"]
 
 
-def read_own_weights(table: Entries, target: str, edges: int, folder: Path) -> tuple[FunctionWeight, ...]:
+def read_own_weights(table: Entries, edges: int, folder: Path) -> tuple[FunctionWeight, ...]:
     """Read the table ``[weights]`` whose kind names a function ``weight(t, **numbers)``.
 
     Parameters
     ----------
     table : Entries
-        Everything that is given: ``kinks`` and ``period`` as for `FunctionWeight`, and arguments of the function by
+        Everything that is given: ``kind`` is ``file.py:function``, the file counted from `folder`, or
+        ``module:function``; ``kinks`` and ``period`` as for `FunctionWeight`, and arguments of the function by
         name, each one number for all edges or a list of one for each.
-    target : str
-        ``file.py:function``, the file counted from `folder`, or ``module:function``.
     edges : int
         Number of edges.
     folder : Path
@@ -35,11 +31,7 @@ def read_own_weights(table: Entries, target: str, edges: int, folder: Path) -> t
     ScenarioError
         If the function cannot be found, imported or called with the numbers, or its values are no weights.
     """
-    try:
-        with imports_from(str(folder / target)):
-            function: Any = named_object(target, folder)
-    except (NamingError, ImportFailedError) as error:
-        raise ScenarioError(f"[weights] kind: {error}") from error
+    target, function = table.text("kind"), table.named("kind", folder)
     if not callable(function):
         raise ScenarioError(f"[weights] kind is '{target}', which is {function!r}; it must be a function of time.")
     given = {key: table.per_edge(key, edges) for key in table if key not in ("kind", "kinks", "period")}
