@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # Threads cost more than they give on matrices of some ten rows.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: run test test-long faults benchmark lint format clean
+.PHONY: run test test-long faults benchmark docs lint format clean
 
 run: $(READY)
 	$(BIN)/hybrid-fmu paper --out results
@@ -32,6 +32,10 @@ benchmark: $(READY)
 	PYTHONPATH=tests $(BIN)/python -m benchmarks
 	PYTHONPATH=tests $(BIN)/python -m benchmarks.step_cost
 
+# The site, readable without a network: build/site/index.html.
+docs: $(READY)
+	$(BIN)/sphinx-build -W --keep-going -q docs build/site
+
 lint: $(READY)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -48,4 +52,4 @@ $(READY): pyproject.toml constraints.txt
 	touch $(READY)
 
 clean:
-	rm -rf $(VENV) results
+	rm -rf $(VENV) results build

@@ -1,0 +1,34 @@
+"""Sphinx: how the pages of this folder become the documentation site (`make docs`)."""
+
+import sys
+from pathlib import Path
+
+import hybrid_model
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+project = "hybrid-fmu"
+author = "the authors of hybrid-fmu"
+release = version = hybrid_model.__version__
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "numpydoc",
+    "site_parts.mathml",
+    "site_parts.page_links",
+]
+
+myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_heading_anchors = 3
+nb_execution_mode = "off"  # notebooks keep their outputs, and tests run them
+
+# Members are listed by autodoc, once.
+numpydoc_show_class_members = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"  # numpydoc sections have them in words
+
+html_theme = "furo"
+html_title = "hybrid-fmu"
+html_math_renderer = "mathml"
+html_show_sourcelink = False
+html_copy_source = False

@@ -1,0 +1,32 @@
+"""The documentation site is built without warnings, holds every page, and is read without a network."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = sorted(page.relative_to(DOCS).with_suffix("") for page in DOCS.rglob("*.md"))
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The site, built as `make docs` does it."""
+    target = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", str(DOCS), str(target)]
+    built = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (built.returncode, built.stderr) == (0, "")
+    return target
+
+
+def test_every_page_is_in_the_table_of_contents(site):
+    contents = (site / "index.html").read_text(encoding="utf-8")
+    wanted = {f"{page.as_posix()}.html" for page in PAGES if page.name != "index"}
+    assert wanted - set(re.findall(r'class="reference internal" href="([^"#]+)"', contents)) == set()
+
+
+def test_nothing_on_a_page_is_loaded_from_elsewhere(site):
+    loaded = re.compile(r'<(?:script|img|link rel="stylesheet")[^>]*(?:src|href)="([a-z]+:)?//', re.IGNORECASE)
+    assert [page.name for page in site.rglob("*.html") if loaded.search(page.read_text(encoding="utf-8"))] == []
