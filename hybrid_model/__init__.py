@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition
+from hybrid_model.declare.diagrams.wiring import feedback, parallel, product, series
 from hybrid_model.declare.dwell import MinimumDwell
 from hybrid_model.declare.hybrid_automaton import HybridAutomaton
 from hybrid_model.declare.margins import greatest, least, lookup
@@ -11,7 +12,6 @@ from hybrid_model.declare.modes import ModalAutomaton, Mode, Switch, TimedSwitch
 from hybrid_model.declare.signals import Signal
 from hybrid_model.declare.transitions import Clock, Jump, Priority, TimeEvent
 from hybrid_model.declare.variables import Dimension, DiscreteState, Input, Output, Parameter, State, Values
-from hybrid_model.declare.wiring import feedback, product, series
 from hybrid_model.errors import (
     AlgebraicLoopError,
     DataError,
@@ -90,6 +90,7 @@ __all__ = [
     "load_arc",
     "load_network_events",
     "lookup",
+    "parallel",
     "product",
     "series",
     "simulate",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import ClassVar
 
 from hybrid_model.declare.real_numbers import told
 from hybrid_model.declare.transitions import Assignments, ClockInfo, JumpInfo, Priority
@@ -41,6 +43,8 @@ class Automaton(ABC):
     clocks: tuple[ClockInfo, ...]
     priority: Priority
     stiff: bool | None = None
+    joined: ClassVar[Callable[[Automaton, str, object], Automaton]]
+    """What the operators do: a composition, which is an automaton itself and so comes after it."""
 
     @property
     @abstractmethod
@@ -82,6 +86,28 @@ class Automaton(ABC):
     def of_kind(self, *kinds: Kind) -> list[Variable]:
         """Return the variables of the given kinds, in declaration order."""
         return [v for v in self.variables if v.kind in kinds]
+
+    # Block diagrams, as in python-control: see `hybrid_model.declare.diagrams.operators`.
+
+    def __mul__(self, first: object) -> Automaton:
+        """Return ``second * first``: the outputs of the first drive the inputs of the second, in their order."""
+        return self.joined("*", first)
+
+    def __rmul__(self, gain: object) -> Automaton:
+        """Return the automaton with its outputs times a number."""
+        return self.joined("gain", gain)
+
+    def __neg__(self) -> Automaton:
+        """Return the automaton with its outputs negated."""
+        return self.joined("gain", -1.0)
+
+    def __add__(self, other: object) -> Automaton:
+        """Return both on the same inputs, with their outputs added."""
+        return self.joined("+", other)
+
+    def __sub__(self, other: object) -> Automaton:
+        """Return both on the same inputs, with the outputs of the other taken away."""
+        return self.joined("-", other)
 
     def __repr__(self) -> str:
         if not hasattr(self, "variables"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import difflib
 import functools
 import inspect
 from collections.abc import Callable, Mapping
@@ -85,6 +86,11 @@ def _instead(name: str, value: Any, options: Mapping[str, type], owner: Any, kno
     for option, kind in options.items():
         if dataclasses.is_dataclass(kind) and name in (field.name for field in dataclasses.fields(kind)):
             return f": write {option}=hm.{kind.__name__}({name}={told(value)})"
+    fields = [(field.name, option) for option, kind in options.items() for field in dataclasses.fields(kind)]
+    close = difflib.get_close_matches(name, [*known, *(field for field, _ in fields)], n=1, cutoff=0.8)
+    for field, option in fields:
+        if close == [field]:
+            return f": write {option}=hm.{options[option].__name__}({field}={told(value)})"
     variables = {v.name: v for v in owner.variables} if isinstance(owner, Automaton) else {}
     if name in variables and variables[name].kind is Kind.INPUT:
         return f": write inputs={{{name!r}: {told(value)}}}"

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hybrid_model.declare.automaton import Automaton, require_automaton
+from hybrid_model.declare.elements import gathered, require_element, split_element
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.real_numbers import told
 from hybrid_model.declare.transitions import Assignments, ClockInfo, JumpInfo, Priority, Trigger
 from hybrid_model.declare.variables import Kind, Value, Values, Variable, element_names, unknown_name
-from hybrid_model.errors import AlgebraicLoopError, DeclarationError, WiringError
+from hybrid_model.errors import AlgebraicLoopError, WiringError
 
 Source = str | Sequence[str]
 """``"part.output"``, or one such name per element of a vector input."""
@@ -269,6 +270,9 @@ class _Scopes:
         return np.stack(values) if values else np.zeros(0)
 
     def _source(self, part: str, variable: str) -> Value:
+        if (part, variable) not in self._composition._names:
+            whole, place = split_element(variable) or (variable, ())
+            return self._source(part, whole)[place]
         if (part, variable) in self._composition._computed:
             return self.output(part, variable)
         return self._s[self._composition._names[part, variable]]
@@ -299,7 +303,7 @@ class _PartValues(Values):
             elif name in self._wires:
                 value = self._scopes.wired(self._wires[name])
             else:
-                raise DeclarationError(unknown_name(self._owner, name, {**self._own, **self._wires}))
+                return self._element(name, {**self._own, **self._wires})
             self._values[name] = value
         return value
 
@@ -332,7 +336,7 @@ def _require_arguments(name: object, parts: object, connections: object, names: 
 
 def _wires(composition: Composition, connections: Mapping[str, Source]) -> dict[tuple[str, str], _Wire]:
     wires = {}
-    for target, source in connections.items():
+    for target, source in _whole_targets(composition, connections).items():
         part, variable = _find(composition, target, (Kind.INPUT,), "an input")
         if not isinstance(source, (str, Sequence)):
             raise WiringError(
@@ -353,9 +357,28 @@ def _wires(composition: Composition, connections: Mapping[str, Source]) -> dict[
     return wires
 
 
+def _whole_targets(composition: Composition, connections: Mapping[str, Source]) -> dict[str, Source]:
+    """Return the connections with those to elements of one input, ``part.input[1]``, in one list."""
+    inputs = {f"{p}.{v.name}": v.start for p, part in composition.parts.items() for v in part.of_kind(Kind.INPUT)}
+
+    def joined(start: np.ndarray[Any, Any], sources: Mapping[tuple[int, ...], Source]) -> Source:
+        if start.ndim > 1 or len(sources) < start.size:
+            raise WiringError(
+                f"{composition.name}: {', '.join(map(told, sources.values()))} are connected to some elements of an "
+                f"input of shape {start.shape}: connect each element of a vector, or give a list with an output a row."
+            )
+        return [str(sources[place]) for place in sorted(sources)]
+
+    return gathered(composition.name, inputs, connections, joined)
+
+
 def _source_elements(composition: Composition, wire: _Wire) -> list[tuple[str, str]]:
     outputs = {(part, v.name): v for part, _ in wire.sources for v in composition.parts[part].variables}
-    return [(source[0], name) for source in wire.sources for name in element_names(outputs[source])]
+    return [
+        (part, name)
+        for part, output in wire.sources
+        for name in (element_names(outputs[part, output]) if (part, output) in outputs else [output])
+    ]
 
 
 def _find(composition: Composition, scoped: str, kinds: tuple[Kind, ...], what: str) -> tuple[str, Variable]:
@@ -368,6 +391,10 @@ def _find(composition: Composition, scoped: str, kinds: tuple[Kind, ...], what: 
         raise WiringError(unknown_name(f"{composition.name} (parts)", scoped, composition.parts))
     known = {v.name: v for v in composition.parts[part].variables if v.kind in kinds}
     variable = scoped[len(part) + 1 :]
+    whole, place = split_element(variable) or (variable, ())
+    if variable not in known and place and whole in known:
+        require_element(composition.name, scoped, f"{part}.{whole}", place, known[whole].shape)
+        return part, replace(known[whole], name=variable, start=np.array(known[whole].start[place]))
     if variable not in known:
         raise WiringError(f"{composition.name}: {scoped} is not {what}; {part} has {', '.join(known) or 'none'}.")
     return part, known[variable]

@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.class_body import UNBOUND, require_sound_body
+from hybrid_model.declare.elements import gathered, split_element
 from hybrid_model.declare.map_results import (
     checked_assignments,
     checked_margin,
@@ -65,6 +66,7 @@ class HybridAutomaton(Automaton):
         declarations = _declared(type(self), Declaration)
         dimensions = _declared(type(self), Dimension)
         for given in values:
+            given, _ = split_element(given) or (given, ())
             if given not in declarations and given not in dimensions:
                 raise DeclarationError(
                     f"{self.name} has nothing named {given!r} to set; it has {', '.join([*declarations, *dimensions])}."
@@ -79,6 +81,12 @@ class HybridAutomaton(Automaton):
             declaration.named(self.name, key, values.get(key, declaration.start), sizes)
             for key, declaration in declarations.items()
         )
+        if any(map(split_element, values)):
+            values = gathered(self.name, {variable.name: variable.start for variable in self.variables}, values)
+            self.variables = tuple(
+                declarations[v.name].named(self.name, v.name, values.get(v.name, v.start), sizes)
+                for v in self.variables
+            )
         self._transitions = self._collect_transitions()
         self.jumps = tuple(
             JumpInfo(t.name, Trigger.STATE)

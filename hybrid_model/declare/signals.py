@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from hybrid_model.declare.elements import filled, gathered
 from hybrid_model.declare.layout import Layout, Place
 from hybrid_model.declare.real_numbers import real_array, told
 from hybrid_model.declare.signatures import ExplainedCall, require_map
@@ -84,7 +85,8 @@ class Inputs:
         breakpoints: list[float] = []
         places = {place.variable.name: place for place in layout.places[Kind.INPUT]}
         parameters = {place.variable.name: place for place in layout.places[Kind.PARAMETER]}
-        for name, value in (given or {}).items():
+        declared = {name: place.variable.start for name, place in (places | parameters).items()}
+        for name, value in gathered(f"{layout.owner} (inputs)", declared, given or {}, _joined).items():
             if name in parameters:
                 breakpoints += self._tune(parameters[name], value)
             elif name not in places:
@@ -213,6 +215,22 @@ class Inputs:
         other = copy.copy(self)
         other._held = self._held.copy()
         return other
+
+
+def _joined(start: FloatArray, values: Mapping[tuple[int, ...], InputValue]) -> InputValue:
+    """Return what is given for some elements of an array as one value of it."""
+    if not any(callable(value) or isinstance(value, Signal) for value in values.values()):
+        return filled(start, values)  # type: ignore[no-any-return]
+    parts = {place: value.value if isinstance(value, Signal) else value for place, value in values.items()}
+
+    def joined(t: float) -> npt.ArrayLike:
+        now = {place: part(t) if callable(part) else part for place, part in parts.items()}
+        return filled(start, now)  # type: ignore[no-any-return]
+
+    # Plain functions of time stay plain: an array is one if any of its elements is.
+    plain = any(callable(value) and not isinstance(value, Signal) for value in values.values())
+    times = [b for value in values.values() if isinstance(value, Signal) for b in value.breakpoints]
+    return joined if plain and not times else Signal(joined, times)
 
 
 def require_tunable(owner: str, variable: Variable, value: InputValue) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from hybrid_model.declare.elements import gathered
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.variables import FloatArray, Kind, Variable, start_array, unknown_name
 from hybrid_model.errors import DeclarationError, SimulationError
@@ -103,7 +104,8 @@ def start_vectors(layout: Layout, given: Mapping[str, npt.ArrayLike] | None) -> 
     """
     vectors: dict[Kind, FloatArray] = {kind: layout.start(kind) for kind in Kind if kind is not Kind.OUTPUT}
     places = {place.variable.name: place for kind in vectors for place in layout.places[kind]} if given else {}
-    for name, value in (given or {}).items():
+    declared = {name: place.variable.start for name, place in places.items()}
+    for name, value in gathered(layout.owner, declared, given or {}).items():
         if name not in places:
             raise DeclarationError(f"starts: {unknown_name(layout.owner, name, places)}")
         variable = places[name].variable

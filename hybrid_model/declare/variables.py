@@ -11,6 +11,7 @@ from typing import Any, NoReturn, Self, overload
 import numpy as np
 import numpy.typing as npt
 
+from hybrid_model.declare.elements import require_element, split_element
 from hybrid_model.declare.real_numbers import real_array, told
 from hybrid_model.declare.signatures import ExplainedCall
 from hybrid_model.errors import DeclarationError
@@ -446,7 +447,16 @@ class Values:
         try:
             return self._values[name]
         except KeyError:
-            raise DeclarationError(unknown_name(self._owner, name, self._values)) from None
+            return self._element(name, self._values)
+
+    def _element(self, name: str, known: Mapping[str, Any]) -> Value:
+        """Return the value of ``v[1]``; refuse every other name."""
+        whole, place = split_element(name) or (name, ())
+        if not place or whole not in known:
+            raise DeclarationError(unknown_name(self._owner, name, known))
+        value = self[whole]
+        require_element(self._owner, name, whole, place, np.shape(value))
+        return value[place]
 
     def __getattr__(self, name: str) -> Value:
         if name.startswith("__"):

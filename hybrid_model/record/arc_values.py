@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.elements import no_element
 from hybrid_model.declare.layout import Place, layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, element_names, unknown_name
@@ -76,9 +77,7 @@ class ArcValues(ABC):
         known = {variable.name: variable for variable in self.automaton.variables}
         whole = name.partition("[")[0] if isinstance(name, str) else name
         if whole in self._places and whole != name:
-            elements = element_names(self._places[whole].variable)
-            what = "a scalar" if elements == [whole] else f"an array of {elements[0]} to {elements[-1]}"
-            raise DeclarationError(f"{self.automaton.name} has no {name}: {whole} is {what}.")
+            raise DeclarationError(no_element(self.automaton.name, name, whole, self._places[whole].variable.shape))
         raise DeclarationError(unknown_name(self.automaton.name, name, known))
 
     @functools.cached_property

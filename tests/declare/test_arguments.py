@@ -241,3 +241,11 @@ def test_a_dwell_time_is_a_number(dwell):
         hm.DeclarationError, match=r"^the minimum dwell time of BouncingBall is .* s: give a positive time"
     ):
         hm.MinimumDwell(BouncingBall(), dwell)
+
+
+@pytest.mark.parametrize(
+    ("slip", "meant"), [("metod", "solver=hm.Solver(method='RK45')"), ("maxjumps", "zeno=hm.Zeno")]
+)
+def test_slips_in_the_name_of_an_option_of_an_option(slip, meant):
+    with pytest.raises(hm.SimulationError, match=re.escape(f"simulate has no option '{slip}': write {meant}")):
+        hm.simulate(BouncingBall(), 1.0, **{slip: "RK45"})

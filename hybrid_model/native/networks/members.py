@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition
+from hybrid_model.declare.elements import split_element
 from hybrid_model.declare.layout import Layout, Place
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import Kind
@@ -175,6 +176,10 @@ class _Lowering:
 
     def _elements(self, path: tuple[str, ...], variable: str) -> list[tuple[int, int]]:
         """Elements of the state or output `variable` of the part at `path`, in the network's vectors."""
+        if split := split_element(variable):
+            whole, index = split
+            shape = next(v.shape for v in self._composition(path[:-1]).parts[path[-1]].variables if v.name == whole)
+            return [self._elements(path, whole)[int(np.ravel_multi_index(index, shape))]]
         while path not in self.by_path:
             composition = self._composition(path)
             part, variable = next(key for key, name in composition._names.items() if name == variable)

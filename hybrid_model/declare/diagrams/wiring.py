@@ -1,4 +1,4 @@
-"""The usual compositions by name: product, series, feedback."""
+"""The usual compositions by name: product, series, parallel, feedback."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from hybrid_model.declare.automaton import Automaton, require_automaton
 from hybrid_model.declare.composition import Composition, Source
+from hybrid_model.declare.diagrams.operators import in_feedback, in_parallel, in_series
 from hybrid_model.declare.real_numbers import told
 from hybrid_model.errors import WiringError
 
@@ -28,7 +29,7 @@ def product(name: str, *parts: Automaton) -> Composition:
     return Composition(name, _by_name(name, parts))
 
 
-def series(name: str, first: Automaton, second: Automaton, connections: Mapping[str, str]) -> Composition:
+def series(name: str, first: Automaton, second: Automaton, connections: Mapping[str, str] | None = None) -> Composition:
     """Compose two parts of which the first drives the second.
 
     Parameters
@@ -37,8 +38,9 @@ def series(name: str, first: Automaton, second: Automaton, connections: Mapping[
         Name of the composition.
     first, second : Automaton
         Of different names.
-    connections : mapping
-        Input of `second` -> output of `first`.
+    connections : mapping, optional
+        Input of `second` -> output of `first`. Default: as many, in the order of their declarations, which is what
+        ``second * first`` does.
 
     Raises
     ------
@@ -46,11 +48,38 @@ def series(name: str, first: Automaton, second: Automaton, connections: Mapping[
         As in `Composition`, and if both parts have one name.
     """
     parts = _by_name(name, (first, second))
+    if connections is None:
+        return in_series(name, first, second)
     return Composition(name, parts, _wires(name, second, first, connections))
 
 
+def parallel(name: str, first: Automaton, second: Automaton) -> Composition:
+    """Compose two parts that have the same inputs and whose outputs are added, as ``first + second`` does.
+
+    Parameters
+    ----------
+    name : str
+        Name of the composition.
+    first, second : Automaton
+        Of different names, with as many inputs and outputs, which are joined in the order of their declarations.
+
+    Raises
+    ------
+    WiringError
+        As in `Composition`, and if both have one name, or not as many signals.
+    """
+    _by_name(name, (first, second))
+    return in_parallel(name, first, second)
+
+
 def feedback(
-    name: str, plant: Automaton, controller: Automaton, measured: Mapping[str, str], actuated: Mapping[str, str]
+    name: str,
+    plant: Automaton,
+    controller: Automaton,
+    measured: Mapping[str, str] | None = None,
+    actuated: Mapping[str, str] | None = None,
+    *,
+    sign: float = -1.0,
 ) -> Composition:
     """Close the loop of a plant and a controller.
 
@@ -60,10 +89,12 @@ def feedback(
         Name of the composition.
     plant, controller : Automaton
         Of different names; the plant's simultaneous jumps come first.
-    measured : mapping
-        Input of `controller` -> output of `plant`.
-    actuated : mapping
-        Input of `plant` -> output of `controller`.
+    measured, actuated : mapping, optional
+        Input of `controller` -> output of `plant`, and input of `plant` -> output of `controller`. Default: as
+        ``control.feedback``, signals are joined in the order of their declarations, and the plant is driven by a
+        reference, an input of the loop, plus `sign` times the controller's output.
+    sign : float
+        Of the feedback where no wires are named; with wires named, signals arrive as they are.
 
     Raises
     ------
@@ -73,6 +104,10 @@ def feedback(
         If measured and actuated signals need each other at one instant.
     """
     parts = _by_name(name, (plant, controller))
+    if measured is None and actuated is None:
+        return in_feedback(name, plant, controller, sign)
+    if measured is None or actuated is None:
+        raise WiringError(f"{name}: name the wires both ways, measured and actuated, or leave both out.")
     wires = _wires(name, controller, plant, measured) | _wires(name, plant, controller, actuated)
     return Composition(name, parts, wires)
 
