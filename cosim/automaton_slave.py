@@ -105,7 +105,7 @@ class AutomatonSlave(Slave):
             raise self.unknown(name)
         return self._running.get(name)
 
-    def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
+    def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:
         """See `Slave.start`."""
         self._block = self._block_of((t_start, t_stop), events=events)
         for name, value in self._starts.items():

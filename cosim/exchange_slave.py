@@ -61,9 +61,9 @@ class ExchangeSlave(FmuSlave):
         self._above = np.zeros(0, dtype=bool)
         self._length: float | None = None
 
-    def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
+    def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:
         """See `Slave.start`."""
-        super().start(t_start, t_stop, events=events)
+        super().start(t_start, t_stop, events=events, early=early)
         self._t, self._t_stop, self._due, self._length = t_start, t_stop, math.inf, None
         description = self._file.description
         states = sum(self._variables.size(unknown.variable.derivative) for unknown in description.derivatives)

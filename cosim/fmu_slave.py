@@ -10,7 +10,7 @@ from typing import Any
 from cosim.errors import CosimError, MisfitError
 from cosim.instances.access import FmuAccess
 from cosim.instances.calls import FmuCalls
-from cosim.instances.fmu_file import FmuFile
+from cosim.instances.fmu_file import STOP_AT_EVENTS, FmuFile
 from cosim.instances.variables import STRUCTURAL, FmuVariables
 from cosim.slave import Slave
 from fmu.importer.instance import Advance, FmuInstance
@@ -62,6 +62,7 @@ class FmuSlave(Slave):
         self.can_restore = bool(interface.canGetAndSetFMUstate)
         self.variable_step = bool(getattr(interface, "canHandleVariableCommunicationStepSize", True))
         self.foresees = self._file.foresees
+        self.stops_after_events = self._file.stops_after_events
         self.default_start_time, self.default_stop_time = self._file.start_time, self._file.stop_time
         self.default_step, self.internal_step = self._file.step, self._file.internal_step
         self._calls = FmuCalls(name)
@@ -69,7 +70,7 @@ class FmuSlave(Slave):
         self._do_step: Callable[[float, float], Advance | None] = self._first_step
         self._begun = False
         self._starts: dict[str, Any] = {}
-        self._events = False
+        self._events = self._early = False
         self._step_size = math.nan
 
     @property
@@ -121,15 +122,15 @@ class FmuSlave(Slave):
         """Load the FMU's binary, once for all runs; `start` does it if nobody has."""
         return self._file.load(self._calls.hear)
 
-    def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
+    def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:
         """See `Slave.start`."""
         if events and not self.has_event_mode:
             raise CosimError(f"{self.name} has no event mode: use the fixed-step master.")
         instance = self.load()
         self._file.claim()
-        self._events = events
+        self._events, self._early = events, early
         try:
-            self._calls(instance.instantiate, events)
+            self._calls(instance.instantiate, events, early)
         except Exception as error:
             self._file.yield_claim()
             other = ". The fixed-step master (--master fixed-step) leaves its event mode off." if events else ""
@@ -137,7 +138,9 @@ class FmuSlave(Slave):
                 f"{self.name} refuses to be instantiated: {self._calls.said.rstrip('.')}{other}"
             ) from error
         self._access = FmuAccess(instance, self._variables, self._calls)
-        self._access.start(self._starts)
+        self._access.start(
+            {STOP_AT_EVENTS: True, **self._starts} if early and self.stops_after_events else self._starts
+        )
         self._calls(instance.enter_initialization, t_start, t_stop)
 
     def begin(self) -> None:
@@ -168,8 +171,10 @@ class FmuSlave(Slave):
             # The last successful time is where an FMU is only if it returned early (FMI 3.0.2 section 4.2).
             early = (told.early or told.terminate) and not _are_one(told.reached, t_next)
             reached = told.reached if early else t_next
-            if (told.event and self._events) or told.terminate or reached >= t_next:
-                return Step(reached, told.event, self._calls.termination() if told.terminate else None)
+            stopped = early and self._early and reached > t
+            if (told.event and self._events) or stopped or told.terminate or reached >= t_next:
+                ended = self._calls.termination() if told.terminate else None
+                return Step(reached, told.event or stopped, ended)
             if not reached > t:
                 raise CosimError(
                     f"{self.name} returns from a step at {t:.17g} s and gets no further: {self._calls.said}"

@@ -77,6 +77,8 @@ class Slave(Block):
 
     has_event_mode: bool
     """Whether events can be handled by the master, at their exact times."""
+    stops_after_events: bool = False
+    """Whether a block that handles its events inside ends its step after each one, if it may (`early` in `start`)."""
     variable_step: bool = True
     """Whether steps may differ in length."""
     internal_step: float | None = None
@@ -101,7 +103,7 @@ class Slave(Block):
         self.tunable = tuple(tunable)
 
     @abstractmethod
-    def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
+    def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:
         """Enter initialization mode.
 
         Parameters
@@ -110,6 +112,8 @@ class Slave(Block):
             Times in s.
         events : bool
             Whether the master handles events; if not, the block handles them inside.
+        early : bool
+            Whether steps may end early where the block handles its events inside; a step that does has `event` set.
         """
 
     @abstractmethod

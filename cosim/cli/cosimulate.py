@@ -254,7 +254,8 @@ def _master(
     if experiment.master not in (None, *MASTERS):
         raise UsageError(f"the master {experiment.master!r} is none of {', '.join(MASTERS)}.")
     able = all(slave.can_restore and slave.variable_step and slave.internal_step is None for slave in slaves)
-    master = experiment.master or (EVENT_EXACT if exact else ERROR_CONTROLLED if flows and able else FIXED_STEP)
+    controlled = able and bool(system.connections)
+    master = experiment.master or (EVENT_EXACT if exact else ERROR_CONTROLLED if controlled else FIXED_STEP)
     if master == FIXED_STEP:
         step = _part(t_stop - t_start, STEP) if proposed is None else proposed
         return run_fixed_step(

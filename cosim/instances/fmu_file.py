@@ -21,6 +21,8 @@ from fmu.importer.unpacking import unpack
 _alone: dict[str, str] = {}
 OWN_TOOL = "hybrid-fmu"
 """What FMUs that this project exports say of their tool."""
+STOP_AT_EVENTS = "stop_at_events"
+"""Their parameter in FMI 2.0 that lets a step end after an event, with fmi2Discard."""
 
 
 class FmuFile:
@@ -84,6 +86,11 @@ class FmuFile:
         FMI asks of FMUs that they name their time events; the events on the states of others come unannounced.
         """
         return str(self.description.generationTool).startswith(OWN_TOOL)
+
+    @property
+    def stops_after_events(self) -> bool:
+        """Whether it ends its steps after its events, if `STOP_AT_EVENTS` is set."""
+        return self.foresees and any(v.name == STOP_AT_EVENTS for v in self.description.modelVariables)
 
     def claim(self) -> None:
         """Note that an instance is about to be made.

@@ -14,7 +14,14 @@ from cosim.fmu_slave import FmuSlave
 
 FACTS = (
     *("inputs", "outputs", "clocks", "tunable", "has_event_mode", "can_restore", "variable_step", "foresees"),
-    *("default_start_time", "default_stop_time", "default_step", "internal_step", "variable_names"),
+    *(
+        "default_start_time",
+        "default_stop_time",
+        "default_step",
+        "internal_step",
+        "variable_names",
+        "stops_after_events",
+    ),
 )
 """What the other side knows of a slave."""
 

@@ -65,13 +65,13 @@ class IsolatedSlave(Slave):
         self._begin()
         super().__init__(name, list(self.inputs.values()), list(self.outputs.values()), self.clocks, self.tunable)
 
-    def start(self, t_start: float, t_stop: float, *, events: bool) -> None:
+    def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:
         """See `Slave.start`; after `close` in a new process."""
         if self._process is None:
             self._begin()
             for name, value in self._given:
                 self._call("set", name, value)
-        self._call("start", t_start, t_stop, events=events)
+        self._call("start", t_start, t_stop, events=events, early=early)
 
     def begin(self) -> None:
         """See `Slave.begin`."""

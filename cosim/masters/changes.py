@@ -76,11 +76,13 @@ class Changes:
             due.setdefault(self._places[name][0], []).append(name)
         return due
 
-    def arrive(self, t: float) -> None:
-        """Set what has changed up to time `t` in s, and the curves."""
-        for names in self.take(t).values():
+    def arrive(self, t: float) -> set[str]:
+        """Set what has changed up to time `t` in s, and the curves; return whose it is that has changed."""
+        changed = self.take(t)
+        for names in changed.values():
             self.set(names, t)
         self.follow(t)
+        return set(changed)
 
     def follow(self, t: float) -> None:
         """Set the curves to their values at `t` in s."""

@@ -155,8 +155,11 @@ class _Run:
 
     def begin(self) -> None:
         """Handle the events of the start."""
-        self.ended = iterate_events(self._system, self._result, self._t_start, lambda: None, entered=True)
-        self.macro = MacroSteps(self._system, self._changes, self._t_start, self._t_stop, self._resolution)
+        t, slaves = self._t_start, self._system.slaves
+        self.macro = macro = MacroSteps(self._system, self._changes, t, self._t_stop, self._resolution)
+        first = [name for name, slave in slaves.items() if slave.stops_after_events]
+        self.ended = iterate_events(self._system, self._result, t, lambda: first, macro.settle, entered=True)
+        self._go_on(t)
         self._largest = np.abs(np.array(self.macro.observe(), dtype=np.float64))
         self._widest = np.abs(self.macro.history.last)
 
@@ -181,7 +184,8 @@ class _Run:
         the moment. So steps are halved until their length tells nothing; a slave without any is believed at once.
         """
         t, macro, left = self._result.t, self.macro, goal - self._result.t
-        h = left if self._h >= left * (1.0 - 1e-9) else min(self._h, max(0.5 * left, 0.1 * self._h))
+        whole_way = macro.meet_at_events or self._h >= left * (1.0 - 1e-9)
+        h = left if whole_way else min(self._h, max(0.5 * left, 0.1 * self._h))
         middle, end = t + 0.5 * h, t + h if h < left else goal
         states, history = macro.save(), macro.history.copy()
         try:
@@ -189,6 +193,9 @@ class _Run:
             outcome, values = self._attempt(t, end)
             if h <= 2.0 * self._resolution:
                 outcome.due |= self._jumped(before)
+                self._arrive(end, values, outcome)
+                return
+            if macro.meet_at_events and (outcome.quiet or outcome.believed):
                 self._arrive(end, values, outcome)
                 return
             if outcome.quiet or outcome.believed:
@@ -272,15 +279,19 @@ class _Run:
         result.t = t
         self._row(t)
         before, shown = len(result.ticks), {name: self._shown(name) for name in due}
-        self.ended = iterate_events(system, result, t, lambda: self._changes.arrive(t))
+        self.ended = iterate_events(system, result, t, lambda: self._changes.arrive(t), self.macro.settle)
         # A slave may stop where its event is about to come; there is one where it shows.
         seen = {tick.slave for tick in result.ticks[before:]}
         seen |= {n for n in due if not system.slaves[n].has_event_mode or self._shown(n) != shown[n]}
         result.events += [Event(t, name) for name in system.slaves if name in seen]
+        self._go_on(t)
+        self._row(t)
+
+    def _go_on(self, t: float) -> None:
+        """Begin anew after the events at `t` in s."""
         if not self.ended:
             self.macro.history.forget(t, self.macro.signals(t))
             self.macro.remember()
-        self._row(t)
 
     def _shown(self, name: str) -> list[Any]:
         """Return all outputs of a slave."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from cosim.errors import CosimError
 from cosim.result import CosimResult
@@ -12,7 +12,13 @@ from hybrid_model.schedule.scheduler import ITERATIONS, Tick
 
 
 def iterate_events(
-    system: System, result: CosimResult, t: float, change: Callable[[], object], *, entered: bool = False
+    system: System,
+    result: CosimResult,
+    t: float,
+    change: Callable[[], Iterable[str]],
+    settle: Callable[[str], Termination | None],
+    *,
+    entered: bool = False,
 ) -> tuple[str, float, Termination] | None:
     """Let all slaves with event mode handle their events, signals travelling at once (rule 6).
 
@@ -25,7 +31,9 @@ def iterate_events(
     t : float
         In s.
     change : callable
-        Sets what changes from outside at this instant.
+        Sets what changes from outside at this instant; returns whose it is.
+    settle : callable
+        Lets a slave that handles its events inside handle those that what it has received brings about at once.
     entered : bool
         Whether the slaves are in event mode already.
 
@@ -39,35 +47,32 @@ def iterate_events(
     CosimError
         If a slave asks for iterations without end.
     """
-    events = [slave for slave in system.slaves.values() if slave.has_event_mode]
-    for slave in events if not entered else ():
+    events = {name: slave for name, slave in system.slaves.items() if slave.has_event_mode}
+    for slave in events.values() if not entered else ():
         slave.enter_event_mode()
-    change()
+    pending = {*change(), *events}
     sent: dict[tuple[str, str], object] = {}
-    for name, slave in system.slaves.items():
-        if not slave.has_event_mode:
-            _send(system, name, sent)
-    pending = {slave.name: 0 for slave in events}
-    counts = dict.fromkeys(pending, 0)
+    for name in system.slaves:
+        if name not in events:
+            pending |= _send(system, name, sent)
+    counts = dict.fromkeys(system.slaves, 0)
     while pending:
-        name = next(slave.name for slave in events if slave.name in pending)
+        name = next(name for name in system.slaves if name in pending)
         counts[name] += 1
         if counts[name] > ITERATIONS:
             raise CosimError(f"{name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s.")
-        update = system.slaves[name].update()
-        result.ticks += [Tick(t, name, clock) for clock in update.ticks]
-        if update.terminated:
-            return name, t, update.terminated
-        if not update.again:
-            del pending[name]
-        for receiver in _send(system, name, sent):
-            if receiver in counts:
-                pending[receiver] = 0
-            else:
-                # An output may follow at once from an input: what is behind it is news too.
-                for further in _send(system, receiver, sent) & set(counts):
-                    pending[further] = 0
-    for slave in events:
+        if name in events:
+            update = events[name].update()
+            result.ticks += [Tick(t, name, clock) for clock in update.ticks]
+            again, ended = update.again, update.terminated
+        else:
+            again, ended = False, settle(name)
+        if ended:
+            return name, t, ended
+        if not again:
+            pending.discard(name)
+        pending |= _send(system, name, sent)
+    for slave in events.values():
         slave.enter_step_mode()
     return None
 

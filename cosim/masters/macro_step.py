@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -81,6 +81,8 @@ class MacroSteps:
         Returns all outputs that change along flows: what the accuracy is held against.
     owners : list of str
         Whose they are.
+    meet_at_events : bool
+        Whether all slaves say where their events are, and nothing else that they exchange changes: any step will do.
     steps : int
     """
 
@@ -94,11 +96,9 @@ class MacroSteps:
             self._into[connection.target].append(k)
         self._fed = {name for name, wires in self._into.items() if wires} | set(changes.followed)
         self._probed = [s for s in system.slaves.values() if s.has_event_mode and s.name in self._fed]
-        self._leaping = [
-            (s, s.reader([port for port, p in s.outputs.items() if p.kind == "number"]))
-            for s in system.slaves.values()
-            if not s.has_event_mode and s.name in self._fed
-        ]
+        inside = [slave for slave in system.slaves.values() if not slave.has_event_mode]
+        self._shown = {slave.name: slave.reader(list(slave.outputs)) for slave in inside}
+        self._leaping = [(s, self._shown[s.name]) for s in inside if s.name in self._fed]
         self._inside = [c for c in self._held if not system.slaves[c.source].has_event_mode]
         names = [name for name in system.output_names if _is_flowing_number(system, name)]
         self.observe: Callable[[], list[float]] = system.reader(names)
@@ -106,6 +106,9 @@ class MacroSteps:
         self._alone = system.reader([name for name in names if not system.output(name)[0].has_event_mode])
         self._known: dict[int, Any] = {}
         self._at = dict.fromkeys(system.slaves, t)
+        self.meet_at_events = not self._fed and all(
+            slave.has_event_mode or slave.stops_after_events for slave in system.slaves.values()
+        )
         self.steps = 0
         self.history = SignalHistory(t, self.signals(t))
         self.remember()
@@ -183,6 +186,8 @@ class MacroSteps:
         for name, slave in self._system.slaves.items():
             for k in self._into[name]:
                 slave.set(self._flows[k].input, float(expected[k]))
+            if self._at[name] >= t_next:  # by the length of a step that let it settle
+                continue
             made = slave.step(self._at[name], t_next)
             self.steps += 1
             if made.reached < self._at[name] - self._resolution or made.reached > t_next + self._resolution:
@@ -204,10 +209,32 @@ class MacroSteps:
         values = self.signals(t_next)
         outcome.due |= {slave.name for slave in self._probed if self._probe(slave, t_next)}
         outcome.pending = any(self._leaps(slave, read, t_next) for slave, read in self._leaping)
-        outcome.due |= {
-            c.source for k, c in enumerate(self._inside) if self._system.get(f"{c.source}.{c.output}") != self._known[k]
-        }
+        for k, c in enumerate(self._inside):
+            if self._system.get(f"{c.source}.{c.output}") != self._known[k]:
+                outcome.due.add(c.source)
+                # What ends its steps after events has its event here, or it had ended before.
+                outcome.exact |= self._system.slaves[c.source].stops_after_events and c.source not in self._fed
         return outcome, values
+
+    def settle(self, name: str) -> Termination | None:
+        """Let a slave that handles its events inside handle those that are due at once, in a step of no length.
+
+        It stays behind that step where something has happened; else the step is taken back.
+        """
+        slave, t = self._system.slaves[name], self._at[name]
+        if t + self._resolution > self._t_stop:
+            return None
+        state, before = slave.save(), self._shown[name]()
+        try:
+            made = slave.step(t, t + self._resolution)
+            if _differ(before, self._shown[name]()) or made.terminated:
+                self._at[name] = made.reached
+            else:
+                slave.restore(state)
+        finally:
+            slave.release(state)
+        self.steps += 1
+        return made.terminated
 
     def _probe(self, slave: Slave, t: float) -> bool:
         """Return whether a slave has an event with the inputs that it has now."""
@@ -221,7 +248,7 @@ class MacroSteps:
             slave.release(state)
         return made.event or made.terminated is not None
 
-    def _leaps(self, slave: Slave, read: Callable[[], list[float]], t: float) -> bool:
+    def _leaps(self, slave: Slave, read: Callable[[], list[Any]], t: float) -> bool:
         """Return whether a slave that handles events inside jumps at once with the inputs that it has now."""
         if t + self._resolution > self._t_stop:
             return False
@@ -232,8 +259,15 @@ class MacroSteps:
             slave.restore(state)
         finally:
             slave.release(state)
-        far = any(abs(b - a) > LEAP * max(abs(a), abs(b)) for a, b in zip(before, after, strict=True))
-        return far or made.terminated is not None
+        return _differ(before, after) or made.terminated is not None
+
+
+def _differ(before: Sequence[Any], after: Sequence[Any]) -> bool:
+    """Return whether outputs are others after a step of no length: numbers that leap, all else that changes."""
+    return any(
+        abs(b - a) > LEAP * max(abs(a), abs(b)) if isinstance(a, float) else a != b
+        for a, b in zip(before, after, strict=True)
+    )
 
 
 def _is_flowing_number(system: System, name: str) -> bool:

@@ -42,7 +42,8 @@ def require_times(t_start: float, t_stop: float, interval: float | None, what: s
 def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool | None, changes: Changes) -> None:
     """Bring all slaves through initialization mode: values from outside first, then those along the connections.
 
-    Events are handled by the master or not; None: in event mode by the slaves that have it.
+    Events are handled by the master or not; None: in event mode by the slaves that have it, and others may end their
+    steps early.
 
     Raises
     ------
@@ -50,7 +51,8 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool 
         If the start values do not settle: then they depend on each other in a loop.
     """
     for slave in system.slaves.values():
-        slave.start(t_start, t_stop, events=slave.has_event_mode if events is None else events)
+        wanted = slave.has_event_mode if events is None else events
+        slave.start(t_start, t_stop, events=wanted, early=events is None and not wanted)
     changes.set_start_values()
     known: dict[tuple[str, str], float] = {}
     for _ in range(system.most_rounds):

@@ -18,6 +18,8 @@ def with_rollback(slave: Slave) -> str:
     """Return how the error-controlled master treats the events of a slave."""
     if slave.has_event_mode:
         return "events in event mode, come to by ever shorter steps from states that all slaves return to"
+    if slave.stops_after_events:
+        return "events inside, after which its steps end: all slaves go back and meet it there"
     return "events inside, come to by ever shorter steps where they change an output"
 
 

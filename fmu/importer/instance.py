@@ -106,10 +106,11 @@ class FmuInstance:
         """Call a function."""
         return self.function(name)(*arguments)
 
-    def instantiate(self, events: bool = False) -> None:
-        """Make the instance; `events` says whether the master handles events, as FMI 3.0 has it."""
+    def instantiate(self, events: bool = False, early: bool = False) -> None:
+        """Make the instance; whether the master handles events, and whether steps may end early, as FMI 3.0 has it."""
         if self.major == 3:
-            modes = {"eventModeUsed": events, "earlyReturnAllowed": events} if self._kind == "CoSimulation" else {}
+            cosimulates = self._kind == "CoSimulation"
+            modes = {"eventModeUsed": events, "earlyReturnAllowed": events or early} if cosimulates else {}
             self.fmu.instantiate(logMessage=self._heard, **modes)
             return
         self._callbacks = Callbacks(self._log, self.name)

@@ -1,0 +1,78 @@
+"""Slaves that handle their events inside, FMI 2.0 above all, with discrete signals between them: events not lost."""
+
+import numpy as np
+import pytest
+
+import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
+from cosim.cli.main import main
+from cosim.fmu_slave import FmuSlave
+from cosim.masters import run_error_controlled, run_event_exact
+from cosim.system import System
+
+WIRES = {"a.heard": "b.sent", "b.heard": "a.sent"}
+T_END = 40.0
+
+
+class Sends(hm.HybridAutomaton):
+    """An agent: its state goes to what it hears, and it sends it when it has gone on by a part of what is left."""
+
+    heard = hm.Input(0.0, discrete=True)
+    x = hm.State(0.0, output=True)
+    sent = hm.DiscreteState(0.0, output=True)
+    part = hm.Parameter(0.03)
+
+    def flow_map(self, s):
+        return {"x": 0.1 * (s.heard - s.sent)}
+
+    def jump_set(self, s):
+        return (s.x - s.sent) ** 2 - s.part * (s.heard - s.sent) ** 2 - 1e-6
+
+    def jump_map(self, s):
+        return {"sent": s.x}
+
+
+def agents(kind):
+    return [kind("a"), kind("b")]
+
+
+def starts(slaves):
+    for slave, x, part in zip(slaves, (0.0, 1.0), (0.03, 0.05), strict=True):
+        for name, value in {"x": x, "sent": x, "part": part}.items():
+            slave.set(name, value)
+    return slaves
+
+
+@pytest.fixture(scope="module")
+def exact():
+    system = System(starts(agents(lambda name: AutomatonSlave(name, Sends()))), WIRES)
+    result = run_event_exact(system, T_END)
+    assert len(result.events) == 24
+    return result
+
+
+@pytest.mark.parametrize("versions", [("2.0", "2.0"), ("3.0", "2.0")])
+def test_fmus_that_end_their_steps_at_events_meet_there(versions, exported, exact):
+    """An event is where it is, not where a step begins to show it, which is up to 2e-11 of the time before it."""
+    named = zip("ab", versions, strict=True)
+    slaves = starts([FmuSlave(name, exported(Sends(), "sends", version)) for name, version in named])
+    result = run_error_controlled(System(slaves, WIRES), T_END)
+    for name in "ab":
+        # Errors of earlier events are in the later ones.
+        np.testing.assert_allclose(result.event_times(name), exact.event_times(name), atol=1e-11, rtol=0)
+        assert result.final[f"{name}.x"] == pytest.approx(exact.final[f"{name}.x"], abs=1e-12)
+    # Two slaves go on towards the end, return from there to the event, and settle with what was sent.
+    assert result.steps < 7 * len(exact.events)
+    assert "after which its steps end" in result.treatment["b"]
+
+
+def test_the_command_meets_fmi2_at_its_events(exported, tmp_path, capsys):
+    path = exported(Sends(), "sends", "2.0")
+    (tmp_path / "system.toml").write_text(
+        f"[experiment]\nstop_time = {T_END}\n"
+        f'[components.a]\nfmu = "{path}"\n'
+        f'[components.b]\nfmu = "{path}"\nstart = {{ x = 1.0, sent = 1.0, part = 0.05 }}\n'
+        '[connections]\n"a.heard" = "b.sent"\n"b.heard" = "a.sent"\n'
+    )
+    assert main(["cosim", str(tmp_path)]) == 0
+    assert "b: 9 events at 1.87324039, 3.78459902" in capsys.readouterr().out
