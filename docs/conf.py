@@ -4,6 +4,7 @@ import sys
 from pathlib import Path
 
 import hybrid_model
+from hybrid_model.plots import JOURNAL
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -14,6 +15,7 @@ extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
     "numpydoc",
+    "matplotlib.sphinxext.plot_directive",
     "site_parts.mathml",
     "site_parts.page_links",
 ]
@@ -26,6 +28,12 @@ nb_execution_mode = "off"  # notebooks keep their outputs, and tests run them
 numpydoc_show_class_members = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # numpydoc sections have them in words
+
+plot_html_show_formats = False
+plot_html_show_source_link = False
+plot_formats = [("png", 120)]
+plot_rcparams = {**JOURNAL, "figure.figsize": (5.4, 2.6)}
+plot_apply_rcparams = True
 
 html_theme = "furo"
 html_title = "hybrid-fmu"

@@ -3,6 +3,7 @@
 import argparse
 import importlib
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from page_code import Reader, blocks
 
 from cosim.cli.main import _COMMANDS as COMMANDS
+from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import read_scenario
 
 ROOT = Path(__file__).parents[2]
@@ -32,8 +34,17 @@ def name_of(page):
 @pytest.fixture
 def reader(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    before = set(sys.modules)
     matplotlib.use("Agg")
-    return Reader(tmp_path, lambda tables: read_scenario(ANY_SCENARIO | tomllib.loads(tables), tmp_path))
+
+    def read_tables(tables):
+        assert closed_loop(read_scenario(ANY_SCENARIO | tomllib.loads(tables), tmp_path)).parts
+
+    yield Reader(tmp_path, read_tables)
+    for name in set(sys.modules) - before:
+        if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
+            del sys.modules[name]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)

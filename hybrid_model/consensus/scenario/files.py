@@ -22,6 +22,8 @@ from hybrid_model.consensus.weights.kinds import read_weights
 
 __all__ = ["load_scenario", "preset_names", "read_scenario", "scenario_entries"]
 
+TOP_KEYS = ("name", "stop_time", "network", "weights", "switching", "trigger", "channel")
+CHANNEL_KEYS = ("delay", "loss", "seed", "slots")
 MOST_CHANGES = 1e7
 _PRESETS = resources.files("hybrid_model.consensus.scenario") / "presets"
 
@@ -121,9 +123,7 @@ def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = "
     ScenarioError
         If a key is unknown or missing, or a value has the wrong type or is out of range; the message names the entry.
     """
-    top = Entries(
-        "the scenario", entries, ("name", "stop_time", "network", "weights", "switching", "trigger", "channel")
-    )
+    top = Entries("the scenario", entries, TOP_KEYS)
     network = read_network(_subtable(top, "network", NETWORK_KEYS))
     edge_count = len(network.edges)
     scenario = Scenario(
@@ -211,7 +211,7 @@ def _read_trigger(top: Entries, folder: Path) -> Trigger:
 def _read_channel(top: Entries) -> Channel:
     if "channel" not in top:
         return IDEAL
-    table = _subtable(top, "channel", ("delay", "loss", "seed", "slots"))
+    table = _subtable(top, "channel", CHANNEL_KEYS)
     return Channel(
         delay=table.number("delay", default=0.0),
         loss=table.number("loss", default=0.0),

@@ -2,7 +2,6 @@
 
 import math
 import re
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,7 @@ from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.graphs.undirected import complete_edges
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import edge_norm, run_report
-from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, preset_names
 from hybrid_model.consensus.weights.gated_sine import WeightMap
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -156,21 +155,3 @@ class TestVariantsDifferFromScenarioAInOnePoint:
         other, paper = load_scenario(f"paper-a-dwell-{suffix}"), load_scenario("paper-a")
         assert other.switching.dwell == dwell
         assert (other.network, other.weights, other.trigger) == (paper.network, paper.weights, paper.trigger)
-
-
-@pytest.mark.parametrize(("name", "count"), [("scenarios", 11), ("triggers", 2)])
-def test_every_example_on_the_pages_about_scenario_files_is_read(name, count, tmp_path):
-    page = (DOCS / f"{name}.md").read_text(encoding="utf-8")
-    for file, code in re.findall(r"```python\n# (\w+\.py)\n(.*?)```", page, flags=re.DOTALL):
-        (tmp_path / file).write_text(code, encoding="utf-8")
-    examples = [tomllib.loads(text) for text in re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)]
-    assert len(examples) >= count
-    for example in examples:
-        entries = {
-            "name": "example",
-            "stop_time": 10.0,
-            "network": {"agents": 3, "edges": [[1, 2], [2, 3], [3, 1]], "initial": [1.0, 0.0, 0.5]},
-            "weights": {"kind": "constant", "value": 1.0},
-            "trigger": {"kind": "static", "threshold": 0.2},
-        }
-        assert closed_loop(read_scenario(entries | example, tmp_path)).parts
