@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from fmu.describe.variables import FmuVariable
+from hybrid_model.native.assembly_code import assembly_code
 from hybrid_model.native.c_text import array, boolean, definition, row, string
 from hybrid_model.native.model_code import model_code
 from hybrid_model.native.names import NameTable
@@ -42,8 +43,10 @@ def fmu_code(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable], tok
         "variables": "variables",
         "names": "variable_names",
     }
+    parts = assembly_code(traced) if "cs" in kinds and isinstance(traced, NetworkTrace) else None
+    fields["assembly"] = "NULL" if parts is None else "&assembly"
     described = [table, names.definition("variable_names"), definition("Description", "description", fields)]
-    return "\n".join([model_code(traced), '#include "description.h"', "", *described])
+    return "\n".join([model_code(traced), parts or "", '#include "description.h"', "", *described])
 
 
 def _variable(variable: FmuVariable, names: NameTable) -> str:

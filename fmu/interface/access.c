@@ -85,9 +85,12 @@ static const double *elements(const Instance *instance, const Variable *variable
     case BANK_OPTION: *own = run->stop_at_events; return own;
     default: break;
     }
-    const double *values = engine_values(instance->engine, instance_view(instance), (Bank)variable->bank);
+    Assembled *parts = instance_parts(instance);
+    const double *values =
+        parts ? assembled_values(parts, instance_view(instance), (Bank)variable->bank, variable->index)
+              : engine_values(instance->engine, instance_view(instance), (Bank)variable->bank);
     if (values)
-        return values + variable->index;
+        return parts ? values : values + variable->index;
     instance_refuse(instance, "%s: '%s' cannot be computed: %s", instance->name, NAME_OF(variable),
                     engine_problem(instance->engine));
     return NULL;
@@ -151,6 +154,8 @@ static void write_element(Instance *instance, const Variable *variable, size_t k
 {
     if (variable->bank == BANK_OPTION)
         instance->run->stop_at_events = value != 0.0;
+    else if (instance_parts(instance))
+        assembled_set(instance->parts, (Bank)variable->bank, variable->index + k, value);
     else if (variable->bank != BANK_SIZE)
         engine_set(instance->engine, (Bank)variable->bank, variable->index + k, value);
 }

@@ -36,7 +36,7 @@ Answer instance_get_clocks(void *handle, const char *function, const Reference r
     if (!instance || check_clocks(instance, function, references, n, active) != ANSWER_OK)
         return ANSWER_ERROR;
     bool in_event_mode = instance->run->mode == MODE_EVENT;
-    size_t pending = in_event_mode ? engine_pending(instance->engine) : model.n_jumps;
+    size_t pending = in_event_mode ? instance_pending(instance) : model.n_jumps;
     for (size_t i = 0; i < n; i++) {
         const Variable *clock = &description.variables[references[i]];
         bool pends = pending < model.n_jumps;

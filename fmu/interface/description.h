@@ -4,7 +4,7 @@
 #ifndef HYBRID_DESCRIPTION_H
 #define HYBRID_DESCRIPTION_H
 
-#include "engine.h"
+#include "assembly.h"
 
 #if defined(__GNUC__)
 #pragma GCC visibility push(hidden)
@@ -31,6 +31,7 @@ typedef struct {
     size_t n_variables;
     const Variable *variables;         /* value reference = index in this table; 0 is the time */
     const char *names;                 /* of the variables, as in a model */
+    const Assembly *assembly;          /* of a network whose parts meet only at events, for Co-Simulation; else NULL */
 } Description;
 
 extern const Description description;

@@ -89,6 +89,8 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String instanceName, fmi3String ins
     Instance *instance = instance_new(&made.base, sizeof made, __func__, instantiationToken);
     if (instance && intermediateUpdate)
         engine_set_hook(instance->engine, show_intermediate, instance);
+    if (instance && intermediateUpdate && instance->parts)
+        assembled_set_hook(instance->parts, show_intermediate, instance);
     return instance;
 }
 

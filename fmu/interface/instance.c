@@ -67,6 +67,11 @@ Answer instance_null_argument(const Instance *instance, const char *function)
                            instance->name, function);
 }
 
+Assembled *instance_parts(const Instance *instance)
+{
+    return instance->parts && assembled_running(instance->parts) ? instance->parts : NULL;
+}
+
 static void log_jump(void *context, double time, size_t jump)
 {
     const Instance *instance = context;
@@ -83,6 +88,8 @@ static void set_up(Instance *instance)
 {
     Run *run = instance->run;
     engine_reset(instance->engine);
+    if (instance->parts)
+        assembled_reset(instance->parts);
     run->mode = MODE_INSTANTIATED;
     run->time = 0.0;
     run->stop_time = run->next_event = INFINITY;
@@ -95,6 +102,7 @@ static bool is_blank(const char *text)
 
 static void release(Instance *instance, char *name)
 {
+    assembled_free(instance->parts);
     engine_free(instance->engine);
     free(name);
     free(instance);
@@ -109,7 +117,10 @@ static Instance *allocate(const Instance *prototype, size_t size)
     memcpy(instance, prototype, size);
     char *name = malloc(length);
     instance->engine = engine_create(&model, sizeof(Run));
-    if (!name || !instance->engine) {
+    bool in_parts = description.assembly && prototype->interface == CO_SIMULATION;
+    if (instance->engine && in_parts)
+        instance->parts = assembled_create(description.assembly, instance->engine);
+    if (!name || !instance->engine || (in_parts && !instance->parts)) {
         release(instance, name);
         return NULL;
     }
@@ -118,6 +129,8 @@ static Instance *allocate(const Instance *prototype, size_t size)
     instance->run = engine_wrapper(instance->engine);
     instance->categories = LOG_ERRORS | LOG_EVENTS;
     engine_set_jump_hook(instance->engine, log_jump, instance);
+    if (instance->parts)
+        assembled_set_jump_hook(instance->parts, log_jump, instance);
     set_up(instance);
     return instance;
 }

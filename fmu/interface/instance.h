@@ -54,6 +54,7 @@ typedef void LogLine(const Instance *instance, Answer level, const char *categor
 
 struct Instance {
     Engine *engine;
+    Assembled *parts;          /* of a network that is run part by part once it has started; else NULL */
     Run *run;
     const char *name;
     LogLine *log_line;         /* NULL: nobody listens */
@@ -68,6 +69,8 @@ struct Instance {
 /* A copy of the prototype, `size` bytes that begin with an Instance, with an engine and a name of its own;
    NULL (and one log line) if the name or the token is wrong or there is no memory. */
 Instance *instance_new(const Instance *prototype, size_t size, const char *function, const char *token);
+/* The parts, if they run and not the engine; NULL otherwise. */
+Assembled *instance_parts(const Instance *instance);
 /* Logs an error, also when logging is switched off, if there is a logger; always ANSWER_ERROR, so that
    callers can return it. */
 Answer instance_refuse(const Instance *instance, const char *format, ...) LIKE_PRINTF(2, 3);
@@ -142,6 +145,8 @@ typedef struct {
     double next;
 } EventUpdate;
 
+/* The jump that comes next at this instant, n_jumps if none does. */
+size_t instance_pending(const Instance *instance);
 Answer instance_enter_event_mode(void *handle, const char *function, int modes);
 /* From Event Mode to Step Mode or Continuous-Time Mode. */
 Answer instance_leave_event_mode(void *handle, const char *function, int mode);

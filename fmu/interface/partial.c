@@ -18,6 +18,12 @@ static int place_of(const Variable *variable, bool known)
     }
 }
 
+/* The engine with the present state, whatever runs; NULL if it cannot be had. */
+static Engine *whole(const Instance *instance)
+{
+    return instance_parts(instance) ? assembled_whole(instance->parts) : instance->engine;
+}
+
 static Answer check_direction(const Instance *instance, const char *function, const Direction *direction, bool known)
 {
     const void *values = direction->seeds ? (const void *)direction->seeds : direction->results;
@@ -82,7 +88,9 @@ Answer instance_derivatives(void *handle, const char *function, const Direction 
     if (!instance || check_direction(instance, function, unknowns, false) != ANSWER_OK ||
         check_direction(instance, function, knowns, true) != ANSWER_OK)
         return ANSWER_ERROR;
-    Engine *engine = instance->engine;
+    Engine *engine = whole(instance);
+    if (!engine)
+        return instance_refuse(instance, "%s: %s", instance->name, engine_problem(instance->engine));
     const Direction *from = forward ? knowns : unknowns, *to = forward ? unknowns : knowns;
     engine_seeds(engine, places);
     scatter(from, forward, places);
@@ -114,7 +122,9 @@ Answer instance_output_rates(void *handle, const char *function, const Reference
         if (orders[i] != 1)
             return instance_refuse(instance, "%s: %s: derivatives of order %ld are not computed, only the first.",
                                    instance->name, function, (long)orders[i]);
-    Engine *engine = instance->engine;
+    Engine *engine = whole(instance);
+    if (!engine)
+        return instance_refuse(instance, "%s: %s", instance->name, engine_problem(instance->engine));
     const double *rates = engine_values(engine, instance_view(instance), BANK_DERIVATIVE);
     if (!rates)
         return instance_refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));

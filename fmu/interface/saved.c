@@ -5,7 +5,7 @@
 
 #include "instance.h"
 
-/* A mark to recognise a saved state by, and the engine's block. */
+/* A mark to recognise a saved state by, and the engine's block with what evolves in parts behind it. */
 typedef struct {
     const Model *model;
     size_t size;
@@ -25,9 +25,20 @@ enum {
 static const unsigned char MAGIC[MAGIC_SIZE] = {'H', 'Y', 'B', 'R', 'I', 'D', 'S', '\n'};
 #define FORMAT_VERSION 1
 
+/* The engine's block, up to where that of parts may begin. */
+static size_t whole_size(const Instance *instance)
+{
+    return (engine_block_size(instance->engine) + 15) / 16 * 16;
+}
+
+static size_t state_size(const Instance *instance)
+{
+    return whole_size(instance) + (instance->parts ? assembled_state_size(instance->parts) : 0);
+}
+
 static bool is_own(const Instance *instance, const Saved *saved)
 {
-    return saved->model == &model && saved->size == engine_block_size(instance->engine);
+    return saved->model == &model && saved->size == state_size(instance);
 }
 
 static Answer foreign_state(const Instance *instance, const char *function)
@@ -37,8 +48,8 @@ static Answer foreign_state(const Instance *instance, const char *function)
 
 static Saved *new_state(const Instance *instance)
 {
-    size_t size = engine_block_size(instance->engine);
-    Saved *saved = malloc(sizeof *saved + size);
+    size_t size = state_size(instance);
+    Saved *saved = calloc(1, sizeof *saved + size);
     if (saved) {
         saved->model = &model;
         saved->size = size;
@@ -61,6 +72,8 @@ Answer instance_save(void *handle, const char *function, void **state)
     if (!saved)
         return instance_refuse(instance, "%s: %s: out of memory.", instance->name, function);
     engine_save(instance->engine, saved->block);
+    if (instance->parts)
+        assembled_save(instance->parts, saved->block + whole_size(instance));
     *state = saved;
     return ANSWER_OK;
 }
@@ -99,6 +112,8 @@ Answer instance_restore(void *handle, const char *function, const void *state)
                                "restore it in an instance that was made in the same way.",
                                instance->name, function, instance_mode_name(run->mode));
     engine_restore(instance->engine, saved->block);
+    if (instance->parts)
+        assembled_restore(instance->parts, saved->block + whole_size(instance));
     return ANSWER_OK;
 }
 
@@ -195,8 +210,7 @@ static const char *fault(const Instance *instance, const unsigned char *bytes, s
         return "they are of another version of the format";
     if (memcmp(bytes + AT_TOKEN, token, TOKEN_SIZE) != 0)
         return "they are a state of another FMU";
-    if (get_number(bytes + AT_LENGTH) != engine_block_size(instance->engine) ||
-        size != HEADER_SIZE + engine_block_size(instance->engine))
+    if (get_number(bytes + AT_LENGTH) != state_size(instance) || size != HEADER_SIZE + state_size(instance))
         return "their number is not that of a state";
     if (get_number(bytes + AT_CHECKSUM) != checksum(bytes + HEADER_SIZE, size - HEADER_SIZE))
         return "their checksum is wrong";
@@ -219,7 +233,9 @@ Answer instance_deserialize(void *handle, const char *function, const unsigned c
     if (saved) {
         memcpy(saved->block, bytes + HEADER_SIZE, saved->size);
         const Run *run = engine_wrapper_in(instance->engine, saved->block);
-        if (!engine_block_is_sound(instance->engine, saved->block) || !is_sound(run))
+        if (!engine_block_is_sound(instance->engine, saved->block) || !is_sound(run) ||
+            (instance->parts &&
+             !assembled_state_is_sound(instance->parts, saved->block + whole_size(instance))))
             wrong = "what they hold cannot be a state";
     }
     if (wrong) {

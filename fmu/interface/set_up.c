@@ -43,7 +43,10 @@ Answer instance_exit_initialization(void *handle, const char *function)
     bool events_outside = instance->interface == MODEL_EXCHANGE || instance->event_mode_used;
     if (!engine_start(engine))
         return instance_refuse(instance, "%s: %s", instance->name, engine_problem(engine));
-    if (!events_outside && !engine_jump_all(engine))
+    bool going = !instance->parts || assembled_begin(instance->parts);
+    if (going && !events_outside)
+        going = instance->parts ? assembled_jump_all(instance->parts) : engine_jump_all(engine);
+    if (!going)
         return instance_refuse(instance, "%s: %s", instance->name, engine_message(engine));
     engine_clear_ticks(engine);
     instance->run->mode = events_outside ? MODE_EVENT : MODE_STEP;

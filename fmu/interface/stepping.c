@@ -40,10 +40,11 @@ static Answer check_step(const Instance *instance, const char *function, double 
 bool instance_step_quietly(const Instance *instance, double point, double size)
 {
     Run *run = instance->run;
+    Assembled *parts = instance_parts(instance);
     double target = point + size;
     if (!(size > 0.0) || !(target <= run->stop_time) || !(target <= DBL_MAX) || run->end_reported ||
         !(fabs(point - run->time) <= 16.0 * DBL_EPSILON * fabs(run->time)) ||
-        !engine_advance_quietly(instance->engine, target))
+        !(parts ? assembled_advance_quietly(parts, target) : engine_advance_quietly(instance->engine, target)))
         return false;
     run->time = target;
     return true;
@@ -53,18 +54,19 @@ Answer instance_step(Instance *instance, const char *function, double point, dou
                      StepReport *report)
 {
     Engine *engine = instance->engine;
+    Assembled *parts = instance_parts(instance);
     Run *run = instance->run;
     double target = point + size;
     *report = (StepReport){.reached = run->time};
     if (check_step(instance, function, point, size, target) != ANSWER_OK)
         return ANSWER_ERROR;
-    Advance advance = engine_advance(engine, target, policy);
-    double end = engine_target(engine);
+    Advance advance = parts ? assembled_advance(parts, target, policy) : engine_advance(engine, target, policy);
+    double end = parts ? assembled_target(parts) : engine_target(engine);
     bool reached = advance == ADVANCE_REACHED || advance == ADVANCE_EVENT_AT_TARGET;
     bool pending = advance == ADVANCE_EVENT_AT_TARGET || advance == ADVANCE_EVENT_BEFORE;
     run->time = reached ? end : fmin(engine_time(engine), end);
     report->reached = run->time;
-    report->event = pending || engine_jumps_taken(engine) > 0;
+    report->event = pending || (parts ? assembled_jumps_taken(parts) : engine_jumps_taken(engine)) > 0;
     report->early = run->time < target;
     report->terminate = advance == ADVANCE_ENDED;
     if (report->terminate) {

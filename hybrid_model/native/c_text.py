@@ -19,7 +19,7 @@ _OPTIONS: dict[str, Any] = {
     "casadi_int": "long long int",
 }
 
-_SCALARS = ("double", "bool", "size_t", "uint32_t", "ModelFunction")
+_SCALARS = ("double", "bool", "size_t", "uint32_t", "uint64_t", "ModelFunction")
 
 
 def functions(name: str, given: Iterable[ca.Function]) -> str:

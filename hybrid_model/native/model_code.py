@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import accumulate
 
 import casadi as ca
 
 from hybrid_model import scales
+from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.transitions import Priority, Trigger
 from hybrid_model.declare.variables import Kind
@@ -33,8 +34,9 @@ def model_code(traced: Trace | NetworkTrace) -> str:
         A C99 translation unit that defines ``const Model model``.
     """
     maps, work = _maps(traced, derivatives=True, jacobian=traced.automaton.stiff is True)
-    model = _model(traced, work, traced.automaton.name, starts=True)
-    return "\n".join([_PRELUDE, maps, *_tables(traced, starts=True), model])
+    model = model_definition(traced, work, traced.automaton.name, starts=True)
+    tables = [*_starts(traced.layout), *model_tables(traced.automaton, traced.layout)]
+    return "\n".join([_PRELUDE, maps, *tables, model])
 
 
 def run_code(traced: Trace | NetworkTrace, *, jacobian: bool = False) -> str:
@@ -56,8 +58,8 @@ def run_code(traced: Trace | NetworkTrace, *, jacobian: bool = False) -> str:
         A C99 translation unit that defines ``const Model model``, for `hybrid_model.native.build.libraries`.
     """
     maps, work = _maps(traced, derivatives=False, jacobian=jacobian or traced.automaton.stiff is True)
-    model = _model(traced, work, type(traced.automaton).__name__, starts=False)
-    return "\n".join([_PRELUDE, maps, *_tables(traced, starts=False), model])
+    model = model_definition(traced, work, type(traced.automaton).__name__)
+    return "\n".join([_PRELUDE, maps, *model_tables(traced.automaton, traced.layout), model])
 
 
 def _maps(traced: Trace | NetworkTrace, *, derivatives: bool, jacobian: bool) -> tuple[str, Sequence[int]]:
@@ -143,23 +145,26 @@ static int hybrid_reset(size_t jump, const double **arg, double **res, long long
 """
 
 
-def _tables(traced: Trace | NetworkTrace, *, starts: bool) -> list[str]:
-    automaton, layout, names = traced.automaton, traced.layout, NameTable()
-    vectors = _VECTORS if starts else {}
+def _starts(layout: Layout) -> list[str]:
+    return [array("double", f"start_{name}", map(constant, layout.start(kind))) for name, kind in _VECTORS.items()]
+
+
+def model_tables(automaton: Automaton, layout: Layout, prefix: str = "") -> list[str]:
+    """Return the tables of a model that are not numbers to start with, their names after a prefix."""
+    names = NameTable()
     margin_names = [info.name for info in automaton.jumps if info.trigger is Trigger.STATE]
     tables = [
-        *(array("double", f"start_{name}", map(constant, layout.start(kind))) for name, kind in vectors.items()),
-        array("double", "nominals", map(constant, _nominals(layout))),
-        array("bool", "whole", map(boolean, layout.whole)),
-        array("ModelName", "state_names", map(names.entry, layout.names(Kind.STATE))),
-        array("ModelName", "discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
-        array("ModelName", "margin_names", map(names.entry, margin_names)),
-        array("ModelJump", "jumps", _jumps(traced, names)),
+        array("double", f"{prefix}nominals", map(constant, nominals(layout))),
+        array("bool", f"{prefix}whole", map(boolean, layout.whole)),
+        array("ModelName", f"{prefix}state_names", map(names.entry, layout.names(Kind.STATE))),
+        array("ModelName", f"{prefix}discrete_names", map(names.entry, layout.names(Kind.DISCRETE))),
+        array("ModelName", f"{prefix}margin_names", map(names.entry, margin_names)),
+        array("ModelJump", f"{prefix}jumps", _jumps(automaton, names)),
     ]
-    return [*tables, names.definition("names")]
+    return [*tables, names.definition(f"{prefix}names")]
 
 
-def _nominals(layout: Layout) -> list[float]:
+def nominals(layout: Layout) -> list[float]:
     """Return a usual size of each continuous state, 0 where none is declared."""
     variables = [place.variable for place in layout.places[Kind.STATE]]
     return [0.0 if v.nominal is None else v.nominal for v in variables for _ in range(v.size)]
@@ -169,24 +174,52 @@ def _number(value: float | tuple[float, ...]) -> str:
     return row(*map(constant, value)) if isinstance(value, tuple) else constant(value)
 
 
-def _jumps(traced: Trace | NetworkTrace, names: NameTable) -> list[str]:
+def _jumps(automaton: Automaton, names: NameTable) -> list[str]:
     rows = []
     counts = {Trigger.STATE: 0, Trigger.TIME: 0}
-    for info in traced.automaton.jumps:
+    for info in automaton.jumps:
         kind = "JUMP_ON_STATE" if info.trigger is Trigger.STATE else "JUMP_ON_TIME"
         rows.append(row(names.entry(info.name), kind, counts[info.trigger], boolean(info.internal)))
         counts[info.trigger] += 1
     return rows
 
 
-def _model(traced: Trace | NetworkTrace, work: Sequence[int], name: str, *, starts: bool) -> str:
+def model_definition(
+    traced: Trace | NetworkTrace,
+    work: Sequence[int],
+    name: str,
+    *,
+    prefix: str = "",
+    starts: bool = False,
+    maps: Mapping[str, str] | None = None,
+    constants: int = 0,
+) -> str:
+    """Return the definition of a model.
+
+    Parameters
+    ----------
+    traced : Trace or NetworkTrace
+        The automaton's maps.
+    work : sequence of int
+        Sizes of the work arrays.
+    name : str
+        Of the model, for messages.
+    prefix : str
+        Of its own name and of those of its tables.
+    starts : bool
+        Whether its start values are there.
+    maps : mapping, optional
+        Map -> C function, where not all are there under the names that they have in an FMU.
+    constants : int
+        Number of parameters behind the automaton's own.
+    """
     automaton, sizes = traced.automaton, traced.layout.sizes
     fields = {
         "name": string(name),
         "n_states": sizes[Kind.STATE],
         "n_discrete": sizes[Kind.DISCRETE],
         "n_inputs": traced.inputs,
-        "n_parameters": sizes[Kind.PARAMETER],
+        "n_parameters": sizes[Kind.PARAMETER] + constants,
         "n_outputs": sizes[Kind.OUTPUT],
         "n_margins": sum(info.trigger is Trigger.STATE for info in automaton.jumps),
         "n_times": sum(info.trigger is Trigger.TIME for info in automaton.jumps),
@@ -198,9 +231,9 @@ def _model(traced: Trace | NetworkTrace, work: Sequence[int], name: str, *, star
         "quadratures": levels_of_quadratures(traced.pattern("flow", "x")),
         "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" if starts else "NULL" for name in _VECTORS},
-        **{name: f"hybrid_{name}" for name in _MAPS},
+        **{name: f"hybrid_{name}" if maps is None else maps.get(name, "NULL") for name in _MAPS},
         "scales": row(*(f".{name} = {_number(value)}" for name, value in scales.of_models().items())),
-        **{name: name for name in ("nominals", "whole", "jumps")},
-        **{name: name for name in ("state_names", "discrete_names", "margin_names", "names")},
+        **{name: f"{prefix}{name}" for name in ("nominals", "whole", "jumps")},
+        **{name: f"{prefix}{name}" for name in ("state_names", "discrete_names", "margin_names", "names")},
     }
-    return definition("Model", "model", fields)
+    return definition("Model", f"{prefix}model", fields)

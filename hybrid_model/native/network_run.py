@@ -15,7 +15,7 @@ from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.native.build.libraries import engine_library
 from hybrid_model.native.run import Ending, NativeModel, Options
 
-_INTERFACE = 1
+_INTERFACE = 2
 """Of `parts_interface` in parts_exports.c."""
 _BANKS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER, Kind.OUTPUT)
 """In the order of the engine's banks."""
@@ -128,9 +128,8 @@ def _library() -> ctypes.CDLL:
     library = ctypes.CDLL(str(engine_library()))
     network, size, number, pointer = ctypes.c_void_p, ctypes.c_size_t, ctypes.c_double, ctypes.c_void_p
     signatures: dict[str, tuple[object, list[object]]] = {
-        "parts_create": (network, [size, pointer, size, pointer]),
+        "parts_create": (network, [size, pointer, pointer, pointer, size, pointer]),
         "parts_options": (ctypes.POINTER(Options), [network, size]),
-        "parts_sends": (ctypes.c_int, [network, size, size, pointer]),
         "parts_wires": (None, [network, pointer, pointer, pointer, pointer]),
         "parts_place": (None, [network, size, pointer]),
         "parts_start": (ctypes.c_int, [network, number, number, ctypes.c_int]),
@@ -173,13 +172,13 @@ class NativeNetwork:
     def __init__(self, groups: Sequence[PartGroup], group_of: Numbers, wires: PartWires) -> None:
         self.groups, self._group_of, self._wires = tuple(groups), np.ascontiguousarray(group_of, np.uint32), wires
         models = (ctypes.c_void_p * max(1, len(groups)))(*(group.model.pointer for group in groups))
-        self._network = _library().parts_create(len(groups), models, len(group_of), self._group_of.ctypes.data)
+        counts = (ctypes.c_size_t * max(1, len(groups)))(*(len(group.signals) for group in groups))
+        sent = [(_BANKS.index(kind), place) for group in groups for kind, place in group.signals]
+        self._signals = np.array(sent, np.uint32).reshape(-1, 2)
+        parts, signals = (self._group_of.ctypes.data, self._signals.ctypes.data)
+        self._network = _library().parts_create(len(groups), models, counts, signals, len(group_of), parts)
         if not self._network:
             raise MemoryError(f"no memory for a network of {len(group_of)} parts")
-        for k, group in enumerate(groups):
-            signals = np.array([(_BANKS.index(kind), place) for kind, place in group.signals], np.uint32).reshape(-1, 2)
-            if not _library().parts_sends(self._network, k, len(signals), signals.ctypes.data):
-                raise MemoryError(f"no memory for what a network of {len(group_of)} parts sends")
         columns = (wires.first, wires.signals, wires.targets, wires.inputs)
         _library().parts_wires(self._network, *(column.ctypes.data for column in columns))
 

@@ -12,7 +12,12 @@ from hybrid_model.native.build.compiler import find_compiler
 from hybrid_model.native.build.objects import COMMON_FLAGS, STRICT_FLAGS
 
 pytestmark = pytest.mark.skipif(not shutil.which("nm"), reason="needs nm")
-PREFIXES = {"engine": "engine_", "networks": "network_", "interface": "instance_"}
+PREFIXES = {
+    "engine": "engine_",
+    "networks": "network_",
+    "interface": "instance_",
+    "schedule": "(schedule|assembled|queue|pending|log)_",
+}
 
 
 def room_of(source):
@@ -45,7 +50,7 @@ def calls(objects, room):
     return {source.name: {owner[name] for name in wanted & owner.keys()} for source, (_, wanted) in own.items()}
 
 
-@pytest.mark.parametrize("room", ["engine", "networks"])
+@pytest.mark.parametrize("room", ["engine", "networks", "schedule"])
 def test_no_circle(room, objects):
     TopologicalSorter(calls(objects, room)).prepare()
 

@@ -95,16 +95,17 @@ static void run_network(Task *task)
     Dice dice = {task->seed}, pieces = {task->pieces};
     Wiring *wiring = calloc(1, sizeof *wiring);
     const Model *const models[GROUPS] = {&model, &model};
-    const Signal sent = {BANK_DISCRETE, 0};
+    const Signal sent[GROUPS] = {{BANK_DISCRETE, 0}, {BANK_DISCRETE, 0}};
+    const size_t n_sent[GROUPS] = {1, 1};
     wiring->n_parts = 2 + pick(&dice, MOST_PARTS - 2);
     for (size_t i = 0; i < wiring->n_parts; i++)
         wiring->groups[i] = (uint32_t)pick(&dice, GROUPS);
     wire(wiring, &dice, model.n_inputs);
-    Schedule *schedule = schedule_create(GROUPS, models, wiring->n_parts, wiring->groups);
+    Schedule *schedule = schedule_create(GROUPS, models, n_sent, sent, wiring->n_parts, wiring->groups);
+    schedule->keeps_log = true;
     schedule->wires = (Wires){wiring->first, wiring->signals, wiring->targets, wiring->inputs};
     for (size_t group = 0; group < GROUPS; group++) {
         schedule->groups[group].engine->options.look_ahead_steps = 1.0 + (double)pick(&dice, 4);
-        schedule_sends(schedule, group, 1, &sent);
         place(schedule, group, &dice);
     }
     task->failed = !schedule_start(schedule, 0.0, END, true) || !schedule_begin(schedule);

@@ -9,13 +9,13 @@ import pytest
 
 import hybrid_model as hm
 from hybrid_model.native.build.compiler import find_compiler
-from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDERS
+from hybrid_model.native.engine_files import ENGINE_FOLDERS
 from hybrid_model.native.model_code import run_code
 from hybrid_model.native.trace import trace
 
 pytestmark = pytest.mark.faults
 
-FOLDERS = (*ENGINE_FOLDERS, RUNS_FOLDERS[0])
+FOLDERS = ENGINE_FOLDERS
 SANITIZERS = {
     "address": ("-fsanitize=address,undefined", "-fno-sanitize-recover=all"),
     "threads": ("-fsanitize=thread",),

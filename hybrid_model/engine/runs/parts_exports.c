@@ -10,7 +10,7 @@
 #endif
 
 /* Changes with every change of what follows. */
-#define PARTS_INTERFACE 1
+#define PARTS_INTERFACE 2
 
 /* Events since they were taken last, in columns. */
 typedef struct {
@@ -30,9 +30,9 @@ typedef struct {
 } NetworkEnd;
 
 EXPORT int parts_interface(void);
-EXPORT Schedule *parts_create(size_t n_groups, const Model *const models[], size_t n_parts, const uint32_t groups[]);
+EXPORT Schedule *parts_create(size_t n_groups, const Model *const models[], const size_t n_signals[],
+                              const Signal signals[], size_t n_parts, const uint32_t groups[]);
 EXPORT EngineOptions *parts_options(Schedule *schedule, size_t group);
-EXPORT int parts_sends(Schedule *schedule, size_t group, size_t count, const Signal signals[]);
 EXPORT void parts_wires(Schedule *schedule, const uint64_t first[], const uint32_t signals[],
                           const uint32_t targets[], const uint32_t inputs[]);
 EXPORT void parts_place(Schedule *schedule, size_t group, const double *const values[]);
@@ -52,19 +52,19 @@ int parts_interface(void)
     return PARTS_INTERFACE;
 }
 
-Schedule *parts_create(size_t n_groups, const Model *const models[], size_t n_parts, const uint32_t groups[])
+/* The signals stay the caller's, who keeps them as long as the network. */
+Schedule *parts_create(size_t n_groups, const Model *const models[], const size_t n_signals[], const Signal signals[],
+                       size_t n_parts, const uint32_t groups[])
 {
-    return schedule_create(n_groups, models, n_parts, groups);
+    Schedule *schedule = schedule_create(n_groups, models, n_signals, signals, n_parts, groups);
+    if (schedule)
+        schedule->keeps_log = true;
+    return schedule;
 }
 
 EngineOptions *parts_options(Schedule *schedule, size_t group)
 {
     return engine_options(schedule->groups[group].engine);
-}
-
-int parts_sends(Schedule *schedule, size_t group, size_t count, const Signal signals[])
-{
-    return schedule_sends(schedule, group, count, signals);
 }
 
 /* The arrays stay the caller's, who keeps them as long as the network. */
@@ -138,12 +138,7 @@ void parts_read(Schedule *schedule, size_t group, int bank, double *values)
 /* In bytes, without the events. */
 size_t parts_memory(const Schedule *schedule)
 {
-    size_t sum = schedule->n_parts * (sizeof(Part) + sizeof(double) + 5 * sizeof(uint32_t));
-    for (size_t k = 0; k < schedule->n_groups; k++) {
-        const Group *group = &schedule->groups[k];
-        sum += group->count * (group->block_size + group->n_signals * sizeof(double));
-    }
-    return sum;
+    return schedule->size + schedule->n_parts * sizeof(uint32_t);
 }
 
 void parts_free(Schedule *schedule)

@@ -21,8 +21,7 @@ void schedule_touch(Schedule *schedule, uint32_t i)
     part->pending = true;
 }
 
-/* Brings a part that is to receive something to this instant. */
-static bool bring(Schedule *schedule, uint32_t i, double t, uint32_t sender)
+bool schedule_bring(Schedule *schedule, uint32_t i, double t, uint32_t sender)
 {
     Part *part = &schedule->parts[i];
     bool event;
@@ -49,7 +48,7 @@ static bool carry(Schedule *schedule, uint32_t sender, uint64_t wire, double val
     uint32_t target = schedule->wires.targets[wire], input = schedule->wires.inputs[wire];
     if (schedule_inputs(schedule, target)[input] == value)
         return true;
-    if (!schedule->parts[target].touched && !bring(schedule, target, t, sender))
+    if (!schedule->parts[target].touched && !schedule_bring(schedule, target, t, sender))
         return false;
     engine_set(schedule_at(schedule, target), BANK_INPUT, input, value);
     schedule_touch(schedule, target);
@@ -70,7 +69,7 @@ static bool send(Schedule *schedule, uint32_t i, double t, const double *values,
 
 static bool keep(Schedule *schedule, uint32_t i, double t, uint32_t jump, const double *signals, size_t n)
 {
-    return log_event(&schedule->log, t, i, jump, signals, n) ||
+    return !schedule->keeps_log || log_event(&schedule->log, t, i, jump, signals, n) ||
            schedule_refuse(schedule, i, "leaves no memory for its event at t = %.12g s, after %zu others.", t,
                            schedule->log.count);
 }
@@ -96,43 +95,45 @@ static bool show(Schedule *schedule, uint32_t i, double t, uint32_t jump)
     return !any || send(schedule, i, t, sent, schedule->changed);
 }
 
-/* One event iteration of a part: at most one jump; whether another one is due. */
-static bool update(Schedule *schedule, uint32_t i, double t, bool *again)
+/* At most one jump of a part; whether another one is due. */
+static bool jump(Schedule *schedule, uint32_t i, double t, bool *again)
 {
     Engine *engine = schedule_at(schedule, i);
-    bool states_changed;
+    schedule->acting = i;
     schedule->last_jump = NO_JUMP;
-    bool going = engine_jump(engine, &states_changed);
-    uint32_t jump = schedule->last_jump;
+    bool going = engine_jump(engine, &schedule->states_changed);
+    uint32_t taken = schedule->last_jump;
     if (!going) {
-        if (jump != NO_JUMP && schedule_signals(schedule, i, schedule->values) &&
-            !keep(schedule, i, engine_time(engine), jump, schedule->values,
+        if (taken != NO_JUMP && schedule_signals(schedule, i, schedule->values) &&
+            !keep(schedule, i, engine_time(engine), taken, schedule->values,
                   schedule->groups[schedule->parts[i].group].n_signals))
             return false;
         return schedule_over(schedule, i);
     }
-    *again = jump != NO_JUMP && engine_pending(engine) < engine->model->n_jumps;
+    *again = taken != NO_JUMP && engine_pending(engine) < engine->model->n_jumps;
     if (engine->status->ending != ENDED_NOT)
         return schedule_over(schedule, i);
-    return show(schedule, i, t, jump);
+    return show(schedule, i, t, taken);
 }
 
-bool schedule_iterate(Schedule *schedule, double t)
+bool schedule_update(Schedule *schedule, double t)
 {
-    schedule->t = t;
-    while (schedule->pending.count > 0) {
-        uint32_t i = pending_take(&schedule->pending);
-        Part *part = &schedule->parts[i];
-        part->pending = false;
-        bool again = false;
-        if (++part->iterations > MOST_ITERATIONS)
-            return schedule_refuse(schedule, i, "asks for more than %d event iterations at t = %.9g s.",
-                                   MOST_ITERATIONS, t);
-        if (!update(schedule, i, t, &again))
-            return false;
-        if (again)
-            schedule_touch(schedule, i);
-    }
+    uint32_t i = pending_take(&schedule->pending);
+    Part *part = &schedule->parts[i];
+    part->pending = false;
+    bool again = false;
+    if (++part->iterations > MOST_ITERATIONS)
+        return schedule_refuse(schedule, i, "asks for more than %d event iterations at t = %.9g s.", MOST_ITERATIONS,
+                               t);
+    if (!jump(schedule, i, t, &again))
+        return false;
+    if (again)
+        schedule_touch(schedule, i);
+    return true;
+}
+
+bool schedule_close(Schedule *schedule)
+{
     for (size_t k = 0; k < schedule->n_touched; k++) {
         Part *part = &schedule->parts[schedule->touched[k]];
         part->touched = false;
@@ -142,4 +143,13 @@ bool schedule_iterate(Schedule *schedule, double t)
     }
     schedule->n_touched = 0;
     return schedule->end == SCHEDULE_GOING;
+}
+
+bool schedule_iterate(Schedule *schedule, double t)
+{
+    schedule->t = t;
+    while (schedule->pending.count > 0)
+        if (!schedule_update(schedule, t))
+            return false;
+    return schedule_close(schedule);
 }

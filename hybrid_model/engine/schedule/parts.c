@@ -103,7 +103,7 @@ void schedule_predict(Schedule *schedule, uint32_t i)
     Part *part = &schedule->parts[i];
     double next;
     schedule->work++;
-    part->unsure = false;
+    part->unsure = part->far = false;
     if (part->t >= schedule->stop) {
         queue_remove(&schedule->queue, i);
         return;
@@ -122,6 +122,16 @@ void schedule_predict(Schedule *schedule, uint32_t i)
        step says why it ends. */
     double now = found == PREDICTION_EVENT ? part->t : part->t + engine_time_ulp(part->t);
     queue_put(&schedule->queue, i, ahead ? next : now);
+}
+
+void schedule_predict_far(Schedule *schedule, uint32_t i, double steps)
+{
+    EngineOptions *options = engine_options(schedule_at(schedule, i));
+    double few = options->look_ahead_steps;
+    options->look_ahead_steps = steps;
+    schedule_predict(schedule, i);
+    options->look_ahead_steps = few;
+    schedule->parts[i].far = true;
 }
 
 bool schedule_signals(Schedule *schedule, uint32_t i, double *values)

@@ -1,27 +1,5 @@
 /* Heaps: of predicted events by their times, and of the parts that wait for their turn at one instant. */
-#include <stdlib.h>
-
 #include "schedule.h"
-
-bool queue_create(Queue *queue, size_t n_parts)
-{
-    queue->times = malloc(n_parts * sizeof(double) + 1);
-    queue->parts = malloc(n_parts * sizeof(uint32_t) + 1);
-    queue->places = malloc(n_parts * sizeof(uint32_t) + 1);
-    queue->count = 0;
-    if (!queue->times || !queue->parts || !queue->places)
-        return false;
-    for (size_t i = 0; i < n_parts; i++)
-        queue->places[i] = NOBODY;
-    return true;
-}
-
-void queue_free(Queue *queue)
-{
-    free(queue->times);
-    free(queue->parts);
-    free(queue->places);
-}
 
 static bool before(const Queue *queue, uint32_t a, uint32_t b)
 {

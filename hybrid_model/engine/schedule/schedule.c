@@ -1,125 +1,18 @@
 /* A network from its start to its end: the next instant, and who has events there. */
 #include <math.h>
 #include <stdlib.h>
-#include <string.h>
 
 #include "schedule.h"
-
-static void note_jump(void *context, double time, size_t jump)
-{
-    (void)time;
-    ((Schedule *)context)->last_jump = (uint32_t)jump;
-}
-
-static bool make_group(Schedule *schedule, Group *group, const Model *maps)
-{
-    group->present = NOBODY;
-    Engine *engine = group->engine = engine_create(maps, 0);
-    if (!engine)
-        return false;
-    engine_set_jump_hook(engine, note_jump, schedule);
-    group->home = engine->block;
-    group->block_size = engine_block_size(engine);
-    group->inputs_at = (size_t)((unsigned char *)(void *)engine->u - engine->block);
-    if (group->count > (SIZE_MAX - 1) / group->block_size)
-        return false;
-    group->slab = malloc(group->count * group->block_size + 1);
-    return group->slab != NULL;
-}
-
-static bool take_memory(Schedule *schedule, const Model *const models[], const uint32_t groups[])
-{
-    size_t n = schedule->n_parts;
-    schedule->groups = calloc(schedule->n_groups + 1, sizeof(Group));
-    schedule->parts = calloc(n + 1, sizeof(Part));
-    schedule->pending.parts = malloc((n + 1) * sizeof(uint32_t));
-    schedule->touched = malloc((n + 1) * sizeof(uint32_t));
-    schedule->due = malloc((n + 1) * sizeof(uint32_t));
-    if (!schedule->groups || !schedule->parts || !schedule->pending.parts || !schedule->touched || !schedule->due ||
-        !queue_create(&schedule->queue, n))
-        return false;
-    for (size_t i = 0; i < n; i++)
-        schedule->parts[i] = (Part){.group = groups[i], .member = (uint32_t)schedule->groups[groups[i]].count++};
-    for (size_t k = 0; k < schedule->n_groups; k++)
-        if (!make_group(schedule, &schedule->groups[k], models[k]))
-            return false;
-    return true;
-}
-
-Schedule *schedule_create(size_t n_groups, const Model *const models[], size_t n_parts, const uint32_t groups[])
-{
-    Schedule *schedule = calloc(1, sizeof *schedule);
-    if (!schedule)
-        return NULL;
-    schedule->n_groups = n_groups;
-    schedule->n_parts = n_parts;
-    if (!take_memory(schedule, models, groups)) {
-        schedule_free(schedule);
-        return NULL;
-    }
-    return schedule;
-}
-
-void schedule_free(Schedule *schedule)
-{
-    if (!schedule)
-        return;
-    for (size_t k = 0; schedule->groups && k < schedule->n_groups; k++) {
-        Group *group = &schedule->groups[k];
-        if (group->engine)
-            engine_use_block(group->engine, group->home);
-        engine_free(group->engine);
-        free(group->slab);
-        free(group->signals);
-        free(group->sent);
-    }
-    queue_free(&schedule->queue);
-    log_free(&schedule->log);
-    free(schedule->groups);
-    free(schedule->parts);
-    free(schedule->pending.parts);
-    free(schedule->touched);
-    free(schedule->due);
-    free(schedule->values);
-    free(schedule->changed);
-    free(schedule);
-}
-
-bool schedule_sends(Schedule *schedule, size_t number, size_t count, const Signal signals[])
-{
-    Group *group = &schedule->groups[number];
-    group->n_signals = count;
-    group->signals = malloc(count * sizeof(Signal) + 1);
-    group->sent = malloc(count * group->count * sizeof(double) + 1);
-    if (!group->signals || !group->sent)
-        return false;
-    memcpy(group->signals, signals, count * sizeof(Signal));
-    for (size_t k = 0; k < count; k++)
-        group->sends_outputs = group->sends_outputs || signals[k].bank == BANK_OUTPUT;
-    for (size_t k = 0; k < count * group->count; k++)
-        group->sent[k] = NAN;
-    if (count > schedule->log.width || !schedule->values) {
-        schedule->log.width = count > schedule->log.width ? count : schedule->log.width;
-        free(schedule->values);
-        free(schedule->changed);
-        schedule->values = malloc(schedule->log.width * sizeof(double) + 1);
-        schedule->changed = malloc(schedule->log.width * sizeof(bool) + 1);
-    }
-    return schedule->values && schedule->changed;
-}
 
 void schedule_place(Schedule *schedule, size_t number, const double *const values[])
 {
     Engine *engine = schedule->groups[number].engine;
     const Model *m = engine->model;
-    /* A block as the engine's own is at its beginning; no part is on it. */
-    memset(schedule->groups[number].slab, 0, schedule->groups[number].count * schedule->groups[number].block_size);
     for (uint32_t i = 0; i < schedule->n_parts; i++) {
         size_t row = schedule->parts[i].member;
         if (schedule->parts[i].group != number)
             continue;
         schedule_at(schedule, i);
-        engine->status->stop_time = INFINITY;
         engine_copy(engine->live.x, values[BANK_STATE] + row * m->n_states, m->n_states);
         engine_copy(engine->live.z, values[BANK_DISCRETE] + row * m->n_discrete, m->n_discrete);
         engine_copy(engine->u, values[BANK_INPUT] + row * m->n_inputs, m->n_inputs);
@@ -144,7 +37,7 @@ static bool hand_out(Schedule *schedule, uint32_t i, bool *changed)
     return true;
 }
 
-static bool hand_all_out(Schedule *schedule)
+bool schedule_hand_out(Schedule *schedule)
 {
     bool changed = true;
     for (int round = 0; changed; round++) {
@@ -163,7 +56,7 @@ static bool hand_all_out(Schedule *schedule)
 /* The start maps, part by part: later parts see the start values of earlier ones. */
 static bool compute_starts(Schedule *schedule)
 {
-    if (!hand_all_out(schedule))
+    if (!schedule_hand_out(schedule))
         return false;
     for (uint32_t i = 0; i < schedule->n_parts; i++) {
         bool changed = false;
@@ -176,7 +69,7 @@ static bool compute_starts(Schedule *schedule)
         if (!hand_out(schedule, i, &changed))
             return false;
     }
-    return hand_all_out(schedule);
+    return schedule_hand_out(schedule);
 }
 
 bool schedule_start(Schedule *schedule, double start, double stop, bool computed)
@@ -190,7 +83,7 @@ bool schedule_start(Schedule *schedule, double start, double stop, bool computed
     return !computed || compute_starts(schedule);
 }
 
-bool schedule_begin(Schedule *schedule)
+bool schedule_wake(Schedule *schedule)
 {
     for (uint32_t i = 0; i < schedule->n_parts; i++) {
         Engine *engine = schedule_at(schedule, i);
@@ -202,7 +95,12 @@ bool schedule_begin(Schedule *schedule)
         }
         schedule_touch(schedule, i);
     }
-    return schedule_iterate(schedule, schedule->start);
+    return true;
+}
+
+bool schedule_begin(Schedule *schedule)
+{
+    return schedule_wake(schedule) && schedule_iterate(schedule, schedule->start);
 }
 
 static int by_order(const void *a, const void *b)
@@ -237,8 +135,7 @@ static bool first_is_sure(Schedule *schedule, double limit)
     return false;
 }
 
-/* The next instant with events up to `limit`; the parts that have them are brought there. */
-static bool next_instant(Schedule *schedule, double limit, double *instant)
+bool schedule_next_instant(Schedule *schedule, double limit, double *instant)
 {
     Queue *queue = &schedule->queue;
     bool event;
@@ -296,7 +193,7 @@ ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t work)
     while (schedule->end == SCHEDULE_GOING && schedule->finished == 0) {
         if (schedule->work >= schedule->enough)
             return SCHEDULE_GOING;
-        if (!next_instant(schedule, target, &instant))
+        if (!schedule_next_instant(schedule, target, &instant))
             return schedule->end;
         if (schedule->n_due == 0 && schedule->work < schedule->enough)
             break;

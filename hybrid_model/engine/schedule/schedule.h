@@ -1,9 +1,10 @@
-/* Parts that meet only at events: each is one small block, parts with the same maps share an engine, and only those that
-   something happens to are touched.  The rules of one instant are those of docs/semantics.md, and of
+/* Parts that meet only at events: each is one small block, parts with the same maps share an engine, and only those
+   that something happens to are touched.  The rules of one instant are those of docs/semantics.md, and of
    hybrid_model/schedule/scheduler.py, which is the same in Python. */
 #ifndef HYBRID_SCHEDULE_H
 #define HYBRID_SCHEDULE_H
 
+#include "assembly.h"
 #include "parts.h"
 
 #if defined(__GNUC__)
@@ -16,11 +17,6 @@
 /* Event iterations of one part at one instant, and steps of it in a row that lead nowhere, at most. */
 #define MOST_ITERATIONS 10000
 
-/* A scalar that leaves the parts of a group: a state, a discrete state or an output. */
-typedef struct {
-    uint32_t bank, index;
-} Signal;
-
 /* Parts with the same maps. */
 typedef struct {
     Engine *engine;
@@ -29,7 +25,7 @@ typedef struct {
     size_t block_size, inputs_at; /* where in a block its inputs lie */
     size_t count;
     uint32_t present;             /* the part on whose block the engine is */
-    Signal *signals;
+    const Signal *signals;        /* the caller's */
     size_t n_signals;
     bool sends_outputs;
     double *sent;                 /* of each part: its signals as they were sent last */
@@ -42,10 +38,11 @@ typedef struct {
     uint32_t iterations, stalls;
     bool touched, pending;
     bool unsure;                  /* its place in the queue is where its look ahead ended, no event */
+    bool far;                     /* it has looked ahead as far as it may */
 } Part;
 
-/* Predicted events, the earliest first and those of one time in the order of parts: a binary heap that knows where in it
-   each part is. */
+/* Predicted events, the earliest first and those of one time in the order of parts: a binary heap that knows where in
+   it each part is. */
 typedef struct {
     double *times;                /* of each part that is in it */
     uint32_t *parts, *places;
@@ -66,28 +63,37 @@ typedef struct {
     size_t count, capacity, width;
 } EventLog;
 
-/* Wires as compressed rows: those that leave part i are first[i] ... first[i + 1] - 1. */
-typedef struct {
-    const uint64_t *first;
-    const uint32_t *signals, *targets, *inputs;
-} Wires;
-
 /* STIFF: a part's flow has shown that its model needs what it has not, a method for stiff flows. */
 typedef enum { SCHEDULE_GOING, SCHEDULE_REACHED, SCHEDULE_ENDED, SCHEDULE_REFUSED, SCHEDULE_STIFF } ScheduleEnd;
+
+/* Called with each visible jump of a part. */
+typedef void (*PartHook)(void *context, double time, uint32_t part, size_t jump);
 
 typedef struct {
     Group *groups;
     size_t n_groups;
-    Part *parts;
     size_t n_parts;
     Wires wires;
+    /* What evolves lies in one piece of memory without pointers: the parts, their blocks and what was sent, the queue,
+       and who is pending and touched; with it the counts of those, and the times. */
+    unsigned char *memory;
+    size_t size;
+    Part *parts;
     Queue queue;
     Pending pending;
-    uint32_t *touched, *due;
-    size_t n_touched, n_due;
-    EventLog log;
+    uint32_t *touched;
+    size_t n_touched;
     double t, start, stop;        /* s: all events are handled up to t; parts look ahead to stop */
-    uint32_t last_jump;           /* that a part has taken */
+    bool running;                 /* for whoever drives it */
+    uint32_t *due;
+    size_t n_due;
+    EventLog log;
+    bool keeps_log;
+    PartHook hook;
+    void *hook_context;
+    uint32_t acting, last_jump;   /* the part whose turn it is, and the jump that it has taken */
+    bool states_changed;          /* by that jump */
+    size_t jumps;                 /* taken so far, for whoever sets it back */
     double *values;               /* of the signals of one part, and which have changed */
     bool *changed;
     size_t work, enough;          /* events and looks ahead so far */
@@ -98,8 +104,6 @@ typedef struct {
 } Schedule;
 
 /* queue.c */
-bool queue_create(Queue *queue, size_t n_parts);
-void queue_free(Queue *queue);
 /* Puts a part in, or elsewhere. */
 void queue_put(Queue *queue, uint32_t part, double time);
 void queue_remove(Queue *queue, uint32_t part);
@@ -124,29 +128,52 @@ bool schedule_over(Schedule *schedule, uint32_t part);
 double schedule_instant(const Schedule *schedule, uint32_t i, double t);
 /* Brings a part to the target, or to the first event before it; whether it has one there. */
 bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event);
-/* Looks ahead from where a part is, some steps far. */
+/* Looks ahead from where a part is, some steps far; or (far) as far as `steps` of the solver. */
 void schedule_predict(Schedule *schedule, uint32_t i);
+void schedule_predict_far(Schedule *schedule, uint32_t i, double steps);
 /* The signals of a part as they are; false, and the run is over, if they cannot be computed. */
 bool schedule_signals(Schedule *schedule, uint32_t i, double *values);
 
 /* instants.c: what happens at one instant */
 /* A part is to be asked for what is due. */
 void schedule_touch(Schedule *schedule, uint32_t i);
-/* Jumps in the order of parts, signals travelling at once, until nothing is due; then all that were touched look ahead. */
+/* Brings a part to t; `sender` sends to it. */
+bool schedule_bring(Schedule *schedule, uint32_t i, double t, uint32_t sender);
+/* One event iteration of the first part that is pending: at most one jump, and what it sends. */
+bool schedule_update(Schedule *schedule, double t);
+/* The instant is over: all that were touched look ahead. */
+bool schedule_close(Schedule *schedule);
+/* Jumps in the order of parts, signals travelling at once, until nothing is due; then the instant is over. */
 bool schedule_iterate(Schedule *schedule, double t);
 
-/* schedule.c */
-Schedule *schedule_create(size_t n_groups, const Model *const models[], size_t n_parts, const uint32_t groups[]);
+/* memory.c */
+/* `signals` are the scalars that leave the parts of each group, `n_signals` of each, one group after the other; they
+   stay the caller's, who keeps them. */
+Schedule *schedule_create(size_t n_groups, const Model *const models[], const size_t n_signals[],
+                          const Signal signals[], size_t n_parts, const uint32_t groups[]);
 void schedule_free(Schedule *schedule);
-/* The scalars that leave the parts of a group. */
-bool schedule_sends(Schedule *schedule, size_t group, size_t count, const Signal signals[]);
+/* As it was created: no part has values, nothing is due. */
+void schedule_clear(Schedule *schedule);
+/* What evolves, as bytes (aligned as malloc does); whether bytes that come from outside could be that. */
+size_t schedule_state_size(const Schedule *schedule);
+void schedule_save(Schedule *schedule, void *bytes);
+void schedule_restore(Schedule *schedule, const void *bytes);
+bool schedule_state_is_sound(const Schedule *schedule, void *bytes);
+
+/* schedule.c */
 /* Values of all parts of a group, row by row, in the order of the banks. */
 void schedule_place(Schedule *schedule, size_t group, const double *const values[]);
 /* Puts all parts at `start`, with their start maps if their states are to be computed; maps are not evaluated beyond
    `stop`. */
 bool schedule_start(Schedule *schedule, double start, double stop, bool computed);
+/* What all parts send is with their receivers, before anything has happened. */
+bool schedule_hand_out(Schedule *schedule);
+/* All parts are to be asked for what is due at the start. */
+bool schedule_wake(Schedule *schedule);
 /* Takes what is due at the start. */
 bool schedule_begin(Schedule *schedule);
+/* The next instant with events up to `limit`; the parts that have them (`due`) are brought there. */
+bool schedule_next_instant(Schedule *schedule, double limit, double *instant);
 /* Handles events up to the target and brings all parts there; comes back earlier after about so many events and looks
    ahead. */
 ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t work);

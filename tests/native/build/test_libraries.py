@@ -88,7 +88,8 @@ def test_a_model_is_one_call_of_the_compiler_and_no_second_one(calls):
 @posix
 def test_the_engine_is_compiled_once(calls):
     assert len({engine_library() for _ in range(3)}) == 1
-    sources = [file for folder in libraries.ENGINE_FOLDERS for file in folder.glob("*.c")]
+    folders = (*libraries.ENGINE_FOLDERS, *libraries.RUNS_FOLDERS)
+    sources = [file for folder in folders for file in folder.glob("*.c")]
     assert len(calls()) == len(sources) + 1
 
 
