@@ -21,7 +21,8 @@ from hybrid_model import Automaton
 from hybrid_model.declare.arguments import require_automaton
 from hybrid_model.declare.calls import explained
 from hybrid_model.declare.real_numbers import is_real
-from hybrid_model.native.networks.network import NetworkTrace, trace_any
+from hybrid_model.native.kept_models import kept_trace
+from hybrid_model.native.networks.network import NetworkTrace
 
 KINDS = ("cs", "me")
 """Co-Simulation and Model Exchange."""
@@ -91,7 +92,7 @@ def export_fmu(
     _check_experiment(stop_time, step_size)
     chosen = _kinds(kinds)
     check_target(target)
-    traced = trace_any(automaton)
+    traced = kept_trace(automaton)
     variables = fmu_variables(traced, version, clocks=clocks)
     runtime = runtime_sources(version.value)
 

@@ -10,7 +10,7 @@ from fmi_driver.journey import SETTINGS, instance
 from hypothesis import HealthCheck, settings
 
 from fmu.export import export_fmu
-from hybrid_model.native.build.cache_folder import zig_folder
+from hybrid_model.native.build.cache_folder import cache_root, zig_folder
 
 # Nothing that depends on the speed of the machine may decide about a verdict: no deadline, no check for slowness.
 TIMELESS = {"database": None, "deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
@@ -42,6 +42,18 @@ def cache(run_folder):
         patch.setenv("ZIG_GLOBAL_CACHE_DIR", str(zig_folder()))
         patch.setenv("HYBRID_FMU_CACHE", str(run_folder / "cache"))
         yield
+
+
+@pytest.fixture(scope="session")
+def forget_models():
+    """Delete what is kept of exported models, so that they are built again; objects of the engine stay."""
+
+    def forget():
+        for pattern in ("*-model", "*-library"):
+            for file in (cache_root() / "built").glob(f"?/{pattern}"):
+                file.unlink(missing_ok=True)
+
+    return forget
 
 
 @pytest.fixture(scope="session")

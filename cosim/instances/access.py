@@ -9,7 +9,7 @@ from typing import Any
 from cosim.errors import CosimError
 from cosim.instances.calls import FmuCalls
 from cosim.instances.variables import STRUCTURAL, FmuVariables
-from fmu.importer.instance import FmuInstance
+from fmu.importer.instance import BoundCall, FmuInstance
 
 
 class FmuAccess:
@@ -64,41 +64,39 @@ class FmuAccess:
 
     def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
         """Return what reads scalars: numbers of one type in one call of the FMU, and all else one by one."""
-        groups: dict[str, list[int]] = {}
-        for k, name in enumerate(names):
+        groups: dict[str, list[str]] = {}
+        for name in names:
             kind = self.instance.in_one_call(self._variables.places[name][0])
             if kind is not None:
-                groups.setdefault(kind, []).append(k)
-        apart = [k for k in range(len(names)) if not any(k in places for places in groups.values())]
-        at, plans = [0] * len(names), []
-        count = 0
-        for places in groups.values():
-            read, size, firsts = self._group([names[k] for k in places])
-            plans.append(read)
-            for k, first in zip(places, firsts, strict=True):
-                at[k] = count + first
-            count += size
-        for k in apart:
-            at[k], count = count, count + 1
+                groups.setdefault(kind, []).append(name)
+        calls, places = [], dict[str, tuple[Any, Any]]()
+        for group in groups.values():
+            call, found = self._group(group)
+            calls.append(call)
+            places |= found
+        # One by one, into a table by name.
+        others: dict[str, Any] = {name: None for name in names if name not in places}
+        places |= {name: (others, name) for name in others}
+        at, call_all = [places[name] for name in names], self.instance.call_all
 
         def read_all() -> list[Any]:
-            values: list[Any] = []
-            for group in plans:
-                values += self._calls(group)
-            for k in apart:
-                values.append(self.read(names[k]))
-            return [values[k] for k in at]
+            self._calls(call_all, calls)
+            for name in others:
+                others[name] = self.read(name)
+            return [values[k] for values, k in at]
 
         return read_all
 
-    def _group(self, names: Sequence[str]) -> tuple[Callable[[], Any], int, list[int]]:
-        """Return what reads scalars of one type, how many numbers it returns, and where in them each of `names` is."""
+    def _group(self, names: Sequence[str]) -> tuple[BoundCall, dict[str, tuple[Any, Any]]]:
+        """Return the call that reads scalars of one type, and in which array, and where in it, it puts each of them."""
         variables = {place[0].valueReference: place[0] for place in map(self._variables.places.__getitem__, names)}
         sizes = [self._variables.size(variable) for variable in variables.values()]
         firsts = dict(zip(variables, accumulate([0, *sizes]), strict=False))
-        owners = [self._variables.places[name] for name in names]
-        at = [firsts[variable.valueReference] + index for variable, index in owners]
-        return self.instance.numbers(list(variables.values()), sizes), sum(sizes), at
+        call, values = self.instance.numbers(list(variables.values()), sizes)
+        owners = {name: self._variables.places[name] for name in names}
+        return call, {
+            name: (values, firsts[variable.valueReference] + index) for name, (variable, index) in owners.items()
+        }
 
     def write(self, name: str, value: Any) -> None:
         """Write a scalar; of an array the others stay as they are."""

@@ -1,15 +1,17 @@
 """Compile and link shared libraries, for one platform or several.
 
 The same sources give the same bytes: objects hold neither paths nor dates, files are linked under a fixed name, and no
-date is written. Objects that do not depend on the model are kept, see `hybrid_model.native.build.objects`.
+date is written. Objects are kept, those of generated files too, see `hybrid_model.native.build.objects`.
 """
 
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fmu.build.mach_o import export_only
@@ -17,14 +19,14 @@ from fmu.build.platforms import Platform
 from fmu.build.refusals import refusals
 from hybrid_model.native.build.compiler import compiler_identity, is_zig
 from hybrid_model.native.build.jobs import Task, run_all
+from hybrid_model.native.build.kept_files import keep, kept_content
 from hybrid_model.native.build.objects import (
-    COMMON_FLAGS,
     GENERATED_FLAGS,
     Toolchain,
     Unit,
     compile_units,
+    kept_units,
     object_name,
-    own_units,
 )
 from hybrid_model.native.engine_files import ENGINE_FOLDERS
 
@@ -73,19 +75,49 @@ def build_libraries(
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as name:
         scratch = Path(name).resolve()
         toolchains = {platform: Toolchain((*command, *_target(command, platform)), identity) for platform in platforms}
-        units: list[Unit] = []
+        builds = {}
         for platform, toolchain in toolchains.items():
             folder = scratch / platform.name
             folder.mkdir()
-            units += _units(sources, own_folders, include_dirs, toolchain, folder)
-        compile_units(units, scratch, progress)
-        if progress is not None:
+            units = _units(sources, own_folders, include_dirs, toolchain, folder)
+            builds[platform] = _Build(platform, units, _link(toolchain.command, platform, sources, scratch))
+        made = {platform: build.kept() for platform, build in builds.items()}
+        missing = [build for platform, build in builds.items() if made[platform] is None]
+        compile_units([unit for build in missing for unit in build.units], scratch, progress)
+        if progress is not None and missing:
             # It compiles the C library of Windows, and keeps it.
-            hint = " (minutes, the first time)" if any(platform.system == "windows" for platform in platforms) else ""
-            progress(f"linking for {', '.join(platform.name for platform in platforms)}{hint}")
-        links = [_link(toolchain.command, platform, sources, scratch) for platform, toolchain in toolchains.items()]
-        run_all(links, scratch, progress)
-        return {platform: _library(toolchain.command, platform, scratch) for platform, toolchain in toolchains.items()}
+            hint = " (minutes, the first time)" if any(build.platform.system == "windows" for build in missing) else ""
+            progress(f"linking for {', '.join(build.platform.name for build in missing)}{hint}")
+        run_all([build.link for build in missing], scratch, progress)
+        return {platform: made[platform] or build.linked(command) for platform, build in builds.items()}
+
+
+@dataclass(frozen=True)
+class _Build:
+    """What makes one library."""
+
+    platform: Platform
+    units: Sequence[Unit]
+    link: Task
+
+    @property
+    def _key(self) -> str | None:
+        """All that the library follows from; None where that cannot be told."""
+        keys = [unit.key for unit in self.units]
+        return None if None in keys else repr((self.platform, self.link.command[1:], keys))
+
+    def kept(self) -> bytes | None:
+        """The library, if the same one was built before."""
+        return None if self._key is None else kept_content("library", self._key)
+
+    def linked(self, command: Sequence[str]) -> bytes:
+        """The library that has been linked; it is kept."""
+        library = (self.link.folder / _library_name(self.platform)).read_bytes()
+        if self.platform.system == "darwin" and is_zig(command):
+            library = export_only(library, "_fmi")
+        if self._key is not None:
+            keep("library", self._key, library)
+        return library
 
 
 def _target(command: Sequence[str], platform: Platform) -> list[str]:
@@ -104,11 +136,23 @@ def _units(
     engine = [source for source in sources if source.parent in own_folders and source.parent in ENGINE_FOLDERS]
     own = [source for source in sources if source.parent in own_folders and source not in engine]
     # The engine knows no FMI, and its objects serve the runs of this machine too.
-    units = own_units(engine, ENGINE_FOLDERS, toolchain, folder)
-    units += own_units(own, own_folders, toolchain, folder, include_dirs)
-    includes = [*(f"-I{place}" for place in own_folders), *(f"-isystem{place}" for place in include_dirs)]
-    command = (*toolchain.command, *COMMON_FLAGS, *GENERATED_FLAGS, *includes)
-    return units + [Unit(source, folder, command, None) for source in sources if source.parent not in own_folders]
+    units = kept_units(engine, ENGINE_FOLDERS, toolchain, folder)
+    units += kept_units(own, own_folders, toolchain, folder, include_dirs)
+    generated = [source for source in sources if source.parent not in own_folders]
+    for unit in kept_units(generated, own_folders, toolchain, folder, include_dirs, GENERATED_FLAGS):
+        units.append(
+            unit if _knows_its_headers(unit.source, (*own_folders, *include_dirs)) else replace(unit, key=None)
+        )
+    return units
+
+
+def _knows_its_headers(source: Path, folders: Sequence[Path]) -> bool:
+    """Return whether a source asks by name for headers of these folders only, as exported models do."""
+    text = source.read_text(encoding="utf-8", errors="replace")
+    # One beside the source would come first.
+    known = {header.name for folder in folders for header in folder.glob("*.h")}
+    known -= {header.name for header in source.parent.glob("*.h")}
+    return all(name[:1] == "<" or name.strip(' \t\r"') in known for name in re.findall(r"#\s*include\s*([^\n]*)", text))
 
 
 def _library_name(platform: Platform) -> str:
@@ -130,8 +174,3 @@ def _link(command: Sequence[str], platform: Platform, sources: Sequence[Path], s
     return Task(
         arguments, scratch / platform.name, f"link the library for {platform.name}", f"built for {platform.name}"
     )
-
-
-def _library(command: Sequence[str], platform: Platform, scratch: Path) -> bytes:
-    library = (scratch / platform.name / _library_name(platform)).read_bytes()
-    return export_only(library, "_fmi") if platform.system == "darwin" and is_zig(command) else library

@@ -19,6 +19,8 @@ from fmu.standard.value_types import C_TYPES, FLOATS, INTEGERS, accessor
 
 Getter = tuple[Callable[..., list[Any]], tuple[Any, ...]]
 """A function of fmpy, and the arguments with which it returns all elements of one variable."""
+BoundCall = tuple[str, Callable[[], int]]
+"""The name of a function of the FMU, and what calls it with arguments that it has been given."""
 _CLASSES = {
     (2, "CoSimulation"): FMU2Slave,
     (2, "ModelExchange"): FMU2Model,
@@ -139,11 +141,11 @@ class FmuInstance:
             found = _converted(found, _PLAIN[variable.type])
         return found, ([variable.valueReference], *(() if self.major == 2 else (size,)))
 
-    def numbers(self, variables: Sequence[Any], sizes: Sequence[int]) -> Callable[[], Any]:
-        """Return what reads all elements of variables whose types `in_one_call` names alike, in one call of the FMU.
+    def numbers(self, variables: Sequence[Any], sizes: Sequence[int]) -> tuple[BoundCall, Any]:
+        """Return the call that reads all elements of variables whose types `in_one_call` names alike, and into what.
 
         Masters read the same outputs at each of many steps: what the call needs is made once, for as long as the
-        instance lives, and each call returns the same array.
+        instance lives.
         """
         kind = variables[0].type
         name = f"fmi{self.major}Get{accessor(kind, self.major)}"
@@ -151,12 +153,15 @@ class FmuInstance:
         values = (C_TYPES[self.major][kind] * sum(sizes))()
         length = () if self.major == 2 else (c.c_size_t(len(values)),)
         call = self._bound(name, c.byref(references), c.c_size_t(len(variables)), c.byref(values), *length)
+        return (name, call), values
 
-        def read() -> Any:
-            _require_success(name, call())
-            return values
-
-        return read
+    @staticmethod
+    def call_all(calls: Sequence[BoundCall]) -> None:
+        """Make calls that are bound, one after the other."""
+        for name, call in calls:
+            status = call()
+            if status > fmi1Warning:
+                raise FMICallException(function=name, status=status)
 
     def _bound(self, name: str, *arguments: Any) -> Callable[[], int]:
         """Return what calls a function with arguments that are C data already.
@@ -189,7 +194,9 @@ class FmuInstance:
 
         def step(t: float, size: float) -> Advance | None:
             time.value, length.value = t, size
-            _require_success("fmi3DoStep", call())
+            status = call()
+            if status > fmi1Warning:
+                raise FMICallException(function="fmi3DoStep", status=status)
             if event.value or terminate.value or early.value:
                 return Advance(reached.value, event.value, terminate.value, early.value)
             return None
@@ -249,8 +256,3 @@ class FmuInstance:
 
 def _converted(function: Callable[..., list[Any]], convert: Callable[[Any], Any]) -> Callable[..., list[Any]]:
     return lambda *arguments: [convert(value) for value in function(*arguments)]
-
-
-def _require_success(function: str, status: int) -> None:
-    if status > fmi1Warning:
-        raise FMICallException(function=function, status=status)

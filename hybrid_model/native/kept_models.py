@@ -86,10 +86,22 @@ def traced_maps(automaton: Automaton) -> Trace | NetworkTrace:
     TraceError
         If they cannot be traced; also for a slip in a map that the run may never call.
     """
+    taken = current(automaton)
+    if taken is not None and isinstance(taken.trace, Trace | NetworkTrace):
+        return taken.trace
     try:
         return trace_any(automaton)
     except DeclarationError as error:
         raise TraceError(str(error)) from error
+
+
+def kept_trace(automaton: Automaton) -> Trace | NetworkTrace:
+    """Return the traced maps of an automaton, see `trace_any`, and leave them with it: a run needs no others then."""
+    taken = current(automaton)
+    traced = trace_any(automaton)
+    if taken is not None and taken.still_holds():
+        taken.trace = traced
+    return traced
 
 
 def _recent(key: bytes) -> NativeModel | None:

@@ -20,6 +20,8 @@ _INTERFACE = 5
 
 _KINDS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER, Kind.OUTPUT)
 """In the order of the engine's banks."""
+_OUTPUTS = 1
+"""Of `run_evaluate` in exports.c."""
 
 
 class Options(ctypes.Structure):
@@ -148,6 +150,13 @@ class NativeModel:
         address.restype = ctypes.c_void_p
         self.pointer = address()
         _engine()
+
+    def outputs(self, tables: Sequence[FloatArray], width: int) -> FloatArray | None:
+        """Return so many outputs at points, of whose t, x, z, u and p there is a row each; None where one fails."""
+        run, found = NativeRun(self), np.empty((len(tables[0]), width))
+        with _pointers(tables) as pointers:
+            count = _engine().run_evaluate(run.address, _OUTPUTS, len(found), pointers, found.ctypes.data)
+        return found if count == len(found) else None
 
 
 class NativeRun:

@@ -87,7 +87,7 @@ def native_run(
     tolerance = solver.event_tolerance
     rows = run.rows(events_only=events_only)
     return RunRecord(
-        ComputedValues(automaton, inputs),
+        ComputedValues(automaton, inputs, None if driven else model.outputs),
         RowFlows(rows),
         RowJumps(rows),
         stop,

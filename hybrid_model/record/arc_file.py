@@ -45,9 +45,9 @@ Table = Mapping[str, Any]
 def write_record(record: RunRecord, path: Path) -> None:
     """Write a run to a file, which it replaces; `HybridArc.save` calls it."""
     read, flows = record.read, record.flows
-    points = [(t, record.first_j + k) for k, flow in enumerate(flows) for t, _ in flow.points]
-    t, j = (np.array(column) for column in zip(*points, strict=True))
-    samples = np.array([read.channels(t, x, flow.z) for flow in flows for t, x in flow.points])
+    points = [(t, record.first_j + k, x, flow.z) for k, flow in enumerate(flows) for t, x in flow.points]
+    t, j, x, z = (np.array(column) for column in zip(*points, strict=True))
+    samples = read.channels_along(t, x, z)
     scale = np.max(np.abs(samples), axis=0, initial=0.0)
     tolerance = np.maximum(ROUNDING * scale, np.finfo(np.float64).tiny)
     fitted = [_dense(read, piece, flow.z, tolerance) for flow in flows for piece in flow.pieces]

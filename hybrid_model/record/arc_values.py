@@ -10,8 +10,9 @@ from __future__ import annotations
 import bisect
 import functools
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from hybrid_model.declare.layout import Place, layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, element_names, unknown_name
 from hybrid_model.errors import DeclarationError
+
+CompiledOutputs = Callable[[Sequence[FloatArray], int], FloatArray | None]
 
 
 class ArcValues(ABC):
@@ -138,6 +141,11 @@ class ArcValues(ABC):
         """Return states, inputs and outputs in one vector."""
         return np.concatenate([self.states(x), self.inputs(t, x, z), self.outputs(t, x, z)])
 
+    def channels_along(self, t: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return the same at points, one row each, bit by bit as `column` does."""
+        inputs = np.array(self._inputs_along(t, x, z)).reshape(len(t), self.layout.sizes[Kind.INPUT])
+        return np.hstack([self.states(x), inputs, self.outputs_along(t, x, z)])
+
 
 class ComputedValues(ArcValues):
     """Reads a run: inputs and parameters from their signals, outputs from the automaton.
@@ -148,11 +156,17 @@ class ComputedValues(ArcValues):
         What ran.
     signals : Inputs
         Its inputs and parameters as functions of time.
+    compiled : callable, optional
+        Computes so many outputs at points, of whose t, x, z, u and p there is a row each; None where it cannot.
     """
 
-    def __init__(self, automaton: Automaton, signals: Inputs) -> None:
+    def __init__(self, automaton: Automaton, signals: Inputs, compiled: CompiledOutputs | None = None) -> None:
         super().__init__(automaton)
-        self._signals = signals
+        self._signals, self._compiled = signals, compiled
+
+    def __getstate__(self) -> dict[str, Any]:
+        # What is compiled belongs to this process.
+        return {**self.__dict__, "_compiled": None}
 
     def states(self, x: FloatArray) -> FloatArray:
         """See `ArcValues.states`."""
@@ -175,6 +189,14 @@ class ComputedValues(ArcValues):
         if self.layout.sizes[Kind.OUTPUT] == 0:
             return np.zeros(0)
         return self.layout.pack(Kind.OUTPUT, self.automaton.output_values(self.values(t, x, z)))
+
+    def outputs_along(self, t: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
+        """See `ArcValues.outputs_along`."""
+        rows, size = None, self.layout.sizes[Kind.OUTPUT]
+        if self._compiled is not None and len(t) and size:
+            p = [self.parameters(float(s)) for s in t]
+            rows = self._compiled([t, x, z, np.array(self._inputs_along(t, x, z)), np.array(p)], size)
+        return super().outputs_along(t, x, z) if rows is None else rows
 
 
 class ReceivedValues(ComputedValues):

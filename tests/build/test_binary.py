@@ -132,7 +132,7 @@ def _libm():
     return ctypes.util.find_library("m")
 
 
-def test_two_exports_give_the_same_bytes_whoever_makes_them(tmp_path):
+def test_two_exports_give_the_same_bytes_whoever_makes_them(tmp_path, forget_models):
     """In other folders, under another locale, another mask for permissions and other settings of the linker."""
     code = (
         "import sys; from fmu.export import export_fmu; from hybrid_model.models import BouncingBall; "
@@ -149,6 +149,7 @@ def test_two_exports_give_the_same_bytes_whoever_makes_them(tmp_path):
             "PYTHONHASHSEED": str(mask),
         }
         command = [sys.executable, "-c", code, *(fmi.value for fmi in Fmi)]
+        forget_models()
         subprocess.run(command, cwd=folder, env={**os.environ, **settings}, umask=mask, check=True)
         contents.append([(folder / "out" / f"{fmi.value}.fmu").read_bytes() for fmi in Fmi])
         assert list((folder / "tmp").iterdir()) == []

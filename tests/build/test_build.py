@@ -118,6 +118,19 @@ def test_kept_objects_are_those_of_the_same_build(change, logged, empty_cache, t
     assert len(compiled(logged)) == (1 if change == "nothing" else 2)
 
 
+@posix
+@pytest.mark.parametrize("beside", ["", '#include "value.h"\n', "#define NAME <math.h>\n#include NAME\n"])
+def test_a_model_that_was_built_before_needs_no_compiler(beside, logged, empty_cache, tmp_path):
+    """But one whose headers nobody has looked at is built anew."""
+    (tmp_path / "value.h").write_text("#define VALUE 1\n")
+    (tmp_path / "model.c").write_text(f"{beside}{VERSION}")
+    first, second = (
+        compile_fmu([tmp_path / "model.c"], [fmi_headers()], tmp_path / f"{name}.so").read_bytes() for name in "ab"
+    )
+    assert first == second
+    assert len(compiled(logged)) == logged.read_text().count("-shared") == (2 if beside else 1)
+
+
 def test_compiler_error_is_shown_and_leaves_nothing(tmp_path, temporary):
     source = tmp_path / "model.c"
     source.write_text("int broken(void) { return missing; }\n")
@@ -302,13 +315,14 @@ def test_permissions_are_those_the_user_gives_to_files(tmp_path):
     assert (library.stat().st_mode & 0o777, archive.stat().st_mode & 0o777) == (0o750, 0o640)
 
 
-def test_same_sources_in_two_folders_give_the_same_bytes(tmp_path):
-    folders = [tmp_path / "one", tmp_path / "another-with-a-longer-name"]
-    for folder in folders:
+def test_same_sources_in_two_folders_give_the_same_bytes(tmp_path, forget_models):
+    libraries = []
+    for folder in (tmp_path / "one", tmp_path / "another-with-a-longer-name"):
         folder.mkdir()
-    first, second = (build_version(folder).read_bytes() for folder in folders)
-    assert first == second
-    assert str(tmp_path).encode() not in first
+        forget_models()
+        libraries.append(build_version(folder).read_bytes())
+    assert libraries[0] == libraries[1]
+    assert str(tmp_path).encode() not in libraries[0]
 
 
 # ---- which compiler ----

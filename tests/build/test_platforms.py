@@ -115,14 +115,17 @@ def test_a_machine_without_a_platform_is_told_what_can_be_built(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def archives(tmp_path_factory):
+def archives(tmp_path_factory, forget_models):
     """The command line's exports for all platforms: by version, two of them, made by two users in two folders."""
     made = {}
 
     def export(fmi):
         if fmi not in made:
             folder = tmp_path_factory.mktemp(f"fmi-{fmi}")
-            made[fmi] = [exported(folder / name, fmi, mask) for name, mask in (("one", 0o022), ("a second", 0o077))]
+            made[fmi] = []
+            for name, mask in (("one", 0o022), ("a second", 0o077)):
+                forget_models()
+                made[fmi].append(exported(folder / name, fmi, mask))
         return made[fmi]
 
     return export

@@ -377,7 +377,7 @@ def check_ends(start):
     cases = [
         # sqrt(2/9.81) 1.7/0.3 = 2.5586340, and the last 1e-6 s are not run through.
         (BouncingBall(), 3.0, "accumulate", 2.558632, 2.558634),
-        (Broken(), 1.0, "states must be finite", 0.5, 0.5),
+        (Broken(), 1.0, "states must stay finite numbers", 0.5, 0.5),
         (Stuck(), 1.0, "Blocked", 0.5, 0.5 + 1e-8),
         (Stuck(x=0.7, name="outside"), 1.0, "Blocked", 0.0, 0.0),
         (Restless(), 1.0, "1001 jumps", 0.5, 0.5),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybrid_model import HybridArc, NetworkRun, Stop
-from hybrid_model.consensus.certificates.analysis import PATIENCE, analyse
+from hybrid_model.consensus.certificates.analysis import PATIENCE, Analysis, analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.components import component_scenarios, connected_components, union_time
 from hybrid_model.consensus.certificates.forms import BOUNDS, Certified, Form, Progress, Quantity, certified_values
@@ -78,6 +78,7 @@ def certify(
     resolution: float = 0.01,
     patience: float = PATIENCE,
     progress: Progress | None = None,
+    like: Analysis | None = None,
 ) -> Certificates:
     """Certify a scenario.
 
@@ -99,12 +100,17 @@ def certify(
         not fit into half of the memory is left out in any network.
     progress : callable, optional
         Called with the number of bounds that are computed, and of all.
+    like : Analysis, optional
+        Of the same network with this or another trigger, or with other initial states: what it knows is not computed
+        again. Tree, window, resolution and patience are its own then.
     """
     cycle = union_time(scenario)
     general = network_hypotheses(scenario, cycle)
     if len(connected_components(scenario, cycle)) > 1:
         return _in_components(scenario, arc, general, cycle, resolution, patience)
-    analysis = analyse(scenario, tree, window, resolution, patience)
+    if like is None:
+        like = analyse(scenario, tree, window, resolution, patience)
+    analysis = like if like.scenario is scenario else like.alike(scenario)
     bounds = Bounds(analysis)
     # Where no radius exists, there is nothing to compare an observed one with.
     decay: float | None = min((beta for _, beta in bounds.slowest), default=0.0)

@@ -19,7 +19,7 @@ from hybrid_model.native.build.objects import (
     Toolchain,
     compile_units,
     digest,
-    own_units,
+    kept_units,
 )
 from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDERS
 
@@ -126,7 +126,7 @@ def _folder(name: str) -> Iterator[Path]:
 
 
 def _objects(sources: Sequence[Path], toolchain: Toolchain, folder: Path) -> list[str]:
-    units = own_units(sources, (*ENGINE_FOLDERS, *RUNS_FOLDERS), toolchain, folder)
+    units = kept_units(sources, (*ENGINE_FOLDERS, *RUNS_FOLDERS), toolchain, folder)
     compile_units(units, folder)
     return [str(unit.file) for unit in units]
 

@@ -60,29 +60,32 @@ class Unit:
         return Task(arguments, self.folder, f"compile '{self.source.name}' for {self.folder.name}")
 
 
-def own_units(
+def kept_units(
     sources: Iterable[Path],
     header_folders: Sequence[Path],
     toolchain: Toolchain,
     folder: Path,
     foreign_headers: Sequence[Path] = (),
+    warnings: Sequence[str] = STRICT_FLAGS,
 ) -> list[Unit]:
-    """Return units of sources of this project: under strict warnings, and kept.
+    """Return units of sources that include no other headers than those of the folders named: their objects are kept.
 
     Parameters
     ----------
     sources : iterable of Path
         C files, absolute, of different names.
     header_folders, foreign_headers : sequence of Path
-        Folders of the headers that they may include, of this project and of others.
+        Folders of headers, of this project and of others.
     toolchain : Toolchain
         What compiles them.
     folder : Path
         Where objects go.
+    warnings : sequence of str
+        Flags: strict for sources of this project.
     """
     # Foreign headers are system headers, so that strict warnings speak of our own code only.
     includes = [*(f"-I{place}" for place in header_folders), *(f"-isystem{place}" for place in foreign_headers)]
-    flags = (*COMMON_FLAGS, *STRICT_FLAGS)
+    flags = (*COMMON_FLAGS, *warnings)
     headers = digest(file for place in (*header_folders, *foreign_headers) for file in sorted(place.rglob("*.h")))
     # Where files lie is no part of a key.
     basis = (toolchain.identity, toolchain.command[1:], flags, headers)

@@ -25,9 +25,12 @@ class Snapshot:
     key : bytes
         Two automata with one key have maps that trace to the same expressions of their variables. Start values and
         values of parameters are not part of it, unless a map gets at them by the declarations.
+    trace : object
+        What was traced with it and is wanted again, if anything; it may hold the automaton.
     """
 
     def __init__(self, reading: Reading) -> None:
+        self.trace: object = None
         self._watch = reading.watch
         text = repr(reading.records).encode("utf-8", "surrogatepass")
         self.key = blake2b(text, digest_size=20).digest()
