@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import importlib
 import importlib.util
 import os
@@ -57,9 +58,21 @@ def named_object(target: str, folder: str | os.PathLike[str] = "") -> object:
         # A module that is there may fail with the same errors.
         if not _is_about_the_target(error, module, name):
             raise _failed(module, error) from error
-        raise NamingError(f"{target} cannot be found: {error}. Give module:ClassName.") from error
+        there = _suggested(error, name)
+        raise NamingError(f"{target} cannot be found: {error}. {there or 'Give module:ClassName.'}") from error
     except (Exception, SystemExit) as error:
         raise _failed(module, error) from error
+
+
+def _suggested(error: Exception, name: str) -> str:
+    """A sentence with the class that was meant, or all classes of the module."""
+    module = error.obj if isinstance(error, AttributeError) else None
+    own = getattr(module, "__name__", None)
+    names = [
+        key for key, value in vars(module or object).items() if isinstance(value, type) and value.__module__ == own
+    ]
+    near = difflib.get_close_matches(name, names, n=1)
+    return f"Did you mean '{near[0]}'?" if near else f"Its classes: {', '.join(names[:10])}." if names else ""
 
 
 @contextmanager

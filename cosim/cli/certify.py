@@ -6,84 +6,50 @@ import argparse
 import json
 import sys
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import hybrid_model as hm
-from cosim.cli.eta import Eta
-from cosim.cli.exits import Exit, exit_of, progress
-from cosim.cli.scenarios import scenario_of
-from cosim.errors import UsageError
-from hybrid_model.consensus.certificates.analysis import PATIENCE
+from cosim.cli.exits import Exit, exit_of
+from cosim.cli.outputs import results_folder
+from cosim.cli.progress import Work
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.forms import Certified, Quantity
 from hybrid_model.consensus.certificates.sizes import LARGE
 from hybrid_model.consensus.figures.conservatism import save_certificate_figures
 from hybrid_model.consensus.laws.agent_network import agent_network
 from hybrid_model.consensus.laws.closed_loop import closed_loop
+from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-audit.md of this project"
 """What the short names in the sources of values mean."""
-
-_MOST_JUMPS = 20_000
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="name of a preset, or path of a TOML file")
-    parser.add_argument("--json", action="store_true", help="print the certificates as a JSON object")
-    parser.add_argument(
-        "--details",
-        action="store_true",
-        help="with --json: add unit, source and hypotheses of each value, and all hypotheses checked",
-    )
-    parser.add_argument(
-        "--max-jumps",
-        metavar="N",
-        type=int,
-        default=_MOST_JUMPS,
-        help="jumps (broadcasts and breakpoints) after which the run beside the bounds ends (default %(default)s)",
-    )
-    parser.add_argument(
-        "--patience",
-        metavar="S",
-        type=float,
-        default=PATIENCE,
-        help="CPU time in s that each quantity may take which does not scale, in networks of 16 agents or more; what "
-        "would take longer is left out (default %(default)s)",
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="write certificates.json, and figures of the run with its bounds, there"
-    )
-    parser.set_defaults(run=run)
+_RUN, _BOUNDS, _FIGURES = 1.0, 8.0, 6.0
+"""About how long these stages take, as parts of the whole."""
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    if options.max_jumps < 1:
-        raise UsageError(f"--max-jumps {options.max_jumps}: give a whole number of jumps, 1 or more.")
-    scenario = scenario_of(options.scenario)
-    progress("running the closed loop")
+    scenario = load_scenario(options.scenario)
     zeno = hm.ZenoGuard(max_jumps=options.max_jumps)
     large = scenario.network.agents >= LARGE and scenario.trigger.kind is not TriggerKind.CONTINUOUS
     arc: hm.HybridArc | hm.NetworkRun
-    if large:
-        arc = hm.simulate_network(agent_network(scenario), scenario.stop_time, zeno=zeno)
-    else:
-        arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=zeno)
-    progress("computing the bounds")
-    eta = Eta("bounds") if sys.stderr.isatty() else None
-    found = certify(scenario, arc, patience=options.patience, progress=eta)
-    document = json.dumps(_document(found, details=options.details), indent=2)
-    if options.out:
-        if isinstance(arc, hm.HybridArc):
-            progress("drawing the figures")
-            save_certificate_figures(found, arc, options.out)
+    with Work(_RUN + _BOUNDS + _FIGURES * bool(options.out)) as work:
+        work.begin("running the closed loop", _RUN)
+        if large:
+            arc = hm.simulate_network(agent_network(scenario), scenario.stop_time, zeno=zeno)
         else:
-            print(f"hybrid-fmu: figures are of networks with fewer than {LARGE} agents.", file=sys.stderr)
-            options.out.mkdir(parents=True, exist_ok=True)
-        (options.out / "certificates.json").write_text(document + "\n", encoding="utf-8")
+            arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=zeno)
+        work.begin("computing the bounds", _BOUNDS)
+        found = certify(scenario, arc, patience=options.patience, progress=work)
+        document = json.dumps(_document(found, details=options.details), indent=2)
+        if options.out:
+            with results_folder(options.out, "certify") as folder:
+                if isinstance(arc, hm.HybridArc):
+                    work.begin("drawing the figures", _FIGURES)
+                    save_certificate_figures(found, arc, folder)
+                (folder / "certificates.json").write_text(document + "\n", encoding="utf-8")
+    if options.out and large:
+        print(f"hybrid-fmu: figures are of networks with fewer than {LARGE} agents.", file=sys.stderr)
     print(document if options.json else _text(found))
     # Bounds are there also where the thresholds vanish too fast for the run; a note says how far it came.
     return Exit.DONE if arc.stop is hm.Stop.JUMPS else exit_of(arc.stop.name)

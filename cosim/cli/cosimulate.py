@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import shutil
 import sys
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
-from cosim.cli import run_files
-from cosim.cli.exits import Exit, exit_of, given_values, progress
+from cosim.cli.exits import Exit, exit_of, given_values
+from cosim.cli.options.cosimulate import ERROR_CONTROLLED, EVENT_EXACT, FIXED_STEP, MASTERS
+from cosim.cli.outputs import results_folder
+from cosim.cli.progress import Work
 from cosim.cli.run_files import RunFiles
 from cosim.cli.step_study import study
 from cosim.consensus import fmu_system
 from cosim.errors import CosimError, UsageError
-from cosim.isolation.isolated_slave import PATIENCE
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
 from cosim.masters.error_controlled import TOLERANCE
-from cosim.masters.fixed_step import ORDERS
 from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
 from cosim.systems.assembly import assemble
 from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
 from cosim.systems.files import read_system
-from cosim.systems.ssp_reading import VERSIONS
 from cosim.systems.ssp_writing import write_osp, write_ssp
-from cosim.systems.toml_file import INTERFACES
 from cosim.tables.input_table import read_inputs
 from fmu.export import export_fmu
 from fmu.importer.temporary_folders import temporary_folder
@@ -43,80 +43,6 @@ STEP, OUTPUT_INTERVAL = 0.01, 0.1
 """In s: the communication step and the spacing of the output where nobody proposes one, if they fit into the run."""
 FEWEST, MOST = 10, 100_000
 """Steps of a run where nobody proposes their length."""
-EVENT_EXACT, ERROR_CONTROLLED, FIXED_STEP = MASTERS = "event-exact", "error-controlled", "fixed-step"
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument(
-        "system", metavar="SYSTEM", help="an .fmu, .ssp, a system's .toml, a folder with one, or a scenario"
-    )
-    parser.add_argument(
-        "--master",
-        choices=MASTERS,
-        help="default: event-exact; error-controlled where signals change along flows; else fixed-step",
-    )
-    parser.add_argument(
-        "--interface", choices=INTERFACES, help="of FMUs that have both; default: cs, Co-Simulation; me: Model Exchange"
-    )
-    parser.add_argument(
-        "--fmi", choices=("2.0", "3.0"), default="3.0", help="version of the FMUs that are made of a scenario"
-    )
-    parser.add_argument("--tolerance", type=float, help="of the error-controlled master: of each step; default: 1e-9")
-    parser.add_argument(
-        "--order", choices=ORDERS, default=ORDERS[0], help="of the fixed-step master, see docs/cosimulation.md"
-    )
-    parser.add_argument("--start-time", type=float, help="start of the run in s; default: what an .fmu proposes, or 0")
-    parser.add_argument("--stop-time", type=float, help="end of the run in s; an .fmu without a default needs it")
-    parser.add_argument(
-        "--step-size",
-        type=float,
-        help="communication step of the fixed-step master in s; default: what an .fmu proposes, or 0.01",
-    )
-    parser.add_argument(
-        "--output-interval",
-        type=float,
-        help="spacing of the output in s; default: what an .fmu proposes, or 0.1 (event-exact), each step (fixed-step)",
-    )
-    parser.add_argument(
-        "--start-value",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="a number, true or false, the name of an enumeration's item, text, or bytes in base 16; repeatable",
-    )
-    parser.add_argument(
-        "--input-file", type=Path, metavar="IN.csv", help="time, and inputs that nothing drives and tunable parameters"
-    )
-    run_files.add_arguments(parser)
-    parser.add_argument(
-        "--no-validate", action="store_true", help="run an .fmu even if its description does not fit the schema"
-    )
-    parser.add_argument(
-        "--save-as",
-        type=Path,
-        metavar="F.ssp|DIR",
-        help="do not run: write the system as an SSP, or as a folder for libcosim (OspSystemStructure.xml)",
-    )
-    parser.add_argument(
-        "--step-study",
-        type=Path,
-        metavar="DIR",
-        help="of a scenario: how far its agents with fixed steps are from the event-exact run, a table and a figure",
-    )
-    parser.add_argument("--ssp-version", choices=VERSIONS, default=VERSIONS[0])
-    parser.add_argument(
-        "--loop-iterations",
-        type=int,
-        default=0,
-        metavar="N",
-        help="carry signals up to N times round loops without states, until they settle; default: loops are refused",
-    )
-    parser.add_argument("--isolate", action="store_true", help="run each FMU in a process of its own")
-    parser.add_argument(
-        "--call-timeout", type=float, default=PATIENCE, metavar="S", help="s that one call of an isolated FMU may take"
-    )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -130,8 +56,7 @@ def run(options: argparse.Namespace) -> int:
         if definition is None:
             scenario = load_scenario(options.system)
             if options.step_study is not None:
-                print(*study(scenario, options.step_study), sep="\n")
-                return int(Exit.DONE)
+                return _study(scenario, options)
             system, experiment = _agents(scenario, folder, options.fmi), Experiment(stop_time=scenario.stop_time)
             fmus = [Component(name, FMU, str(folder / f"{name}.fmu")) for name in system.slaves]
             definition = SystemDefinition(scenario.name, fmus, broadcast_wires(scenario))
@@ -182,7 +107,7 @@ def _completed(options: argparse.Namespace, system: System, file: Experiment) ->
         step_size=min((s.default_step for s in slaves if s.default_step is not None), default=None),
     )
     # Not `or`: a stop time of 0 is given, and refused with its own sentence.
-    return Experiment(
+    chosen = Experiment(
         **{
             field.name: next(
                 (v for v in (getattr(x, field.name, None) for x in (options, file, proposed)) if v is not None), None
@@ -190,13 +115,28 @@ def _completed(options: argparse.Namespace, system: System, file: Experiment) ->
             for field in fields(Experiment)
         }
     )
+    start = chosen.start_time or 0.0
+    if options.stop_time is not None and not options.stop_time > start:
+        raise UsageError(
+            f"--stop-time {options.stop_time:g}: the run starts at {start:g} s; give the stop after the start."
+        )
+    return chosen
+
+
+def _study(scenario: Scenario, options: argparse.Namespace) -> int:
+    with Work() as work, results_folder(options.step_study, "step-study") as folder:
+        written = [str(options.step_study / path.name) for path in study(scenario, folder, work=work)]
+    print(json.dumps({"files": written}, indent=2) if options.json else "\n".join(written))
+    return int(Exit.DONE)
 
 
 def _agents(scenario: Scenario, folder: Path, fmi: str) -> System:
     fmus = {}
-    for name, automaton in scenario_agents(scenario).items():
-        progress(f"exporting {name}")
-        fmus[name] = export_fmu(automaton, folder / f"{name}.fmu", fmi=fmi)
+    agents = scenario_agents(scenario)
+    with Work(len(agents)) as work:
+        for name, automaton in agents.items():
+            work.begin(f"exporting {name}")
+            fmus[name] = export_fmu(automaton, folder / f"{name}.fmu", fmi=fmi)
     return fmu_system(scenario, fmus)
 
 
@@ -237,8 +177,14 @@ def _run(system: System, options: argparse.Namespace, experiment: Experiment) ->
         raise
     finally:
         files.close()
-    print(_text(result))
-    return max(exit_of(result.ended.name), files.finish(result))
+    if options.json:
+        status, compared = files.finish(result)
+        print(json.dumps(_document(result, compared), indent=2))
+    else:
+        print(_text(result))
+        status, compared = files.finish(result)
+        print(*compared, sep="\n", end="\n" * bool(compared))
+    return max(exit_of(result.ended.name), status)
 
 
 def _master(
@@ -330,3 +276,18 @@ def _text(result: CosimResult) -> str:
     lines += [f"  {slave}.{clock}: {len(result.tick_times(slave, clock))} ticks" for slave, clock in clocks]
     lines += [f"  {name} = {shown(value)}" for name, value in result.final.items()]
     return "\n".join(lines)
+
+
+def _document(result: CosimResult, compared: list[str]) -> dict[str, Any]:
+    clocks = sorted({(tick.slave, tick.clock) for tick in result.ticks})
+    return {
+        "ended": result.ended.name,
+        "message": result.message,
+        "t": result.t,
+        "steps": result.steps,
+        "treatment": result.treatment,
+        "event_times": {name: result.event_times(name).tolist() for name in sorted({e.block for e in result.events})},
+        "ticks": {f"{slave}.{clock}": result.tick_times(slave, clock).tolist() for slave, clock in clocks},
+        "final": {name: value.hex() if isinstance(value, bytes) else value for name, value in result.final.items()},
+        "compared": [line.strip() for line in compared],
+    }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import enum
-import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -19,17 +18,12 @@ class Exit(enum.IntEnum):
     FAILED = 1
     USAGE = 2
     ZENO = 3
+    INTERRUPTED = 130
 
 
 def exit_of(stop: str) -> Exit:
     """Return the exit status for the name of the way a run ended (`hybrid_model.Stop`, `cosim.result.Ended`)."""
     return {"HORIZON": Exit.DONE, "FINISHED": Exit.DONE, "ZENO": Exit.ZENO}.get(stop, Exit.FAILED)
-
-
-def progress(text: str) -> None:
-    """Say what is being done, on stderr and only to a person at a terminal."""
-    if sys.stderr.isatty():
-        print(f"  {text} ...", file=sys.stderr, flush=True)
 
 
 def start_values(given: Sequence[str]) -> dict[str, float]:
@@ -68,7 +62,6 @@ def given_values(given: Sequence[str]) -> dict[str, str]:
 
 def write_csv(path: Path, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> None:
     """Write signals over time as comma-separated values, the time first; Booleans as 0 and 1, bytes in base 16."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["time", *signals])

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 import io
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from cosim.cli.exits import Exit
-from cosim.errors import CosimError, UsageError
-from fmu.errors import BuildError, ExportError
-from hybrid_model import HybridModelError, __version__
-from hybrid_model.consensus.entries import suggestion
-from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.errors import NamingError
+from cosim.errors import UsageError
 
-_COMMANDS = {
+COMMANDS = {
     "paper": ("paper", "reproduce the paper's simulations in all executions"),
     "simulate": ("simulate", "run a scenario"),
     "certify": ("certify", "bounds of a scenario beside what a run shows"),
@@ -25,10 +22,12 @@ _COMMANDS = {
     "export": ("export", "export an automaton or a scenario's agents as FMUs"),
     "cosim": ("cosimulate", "co-simulate a scenario's agents, or run one FMU"),
     "validate": ("validate", "check anybody's FMU"),
+    "doctor": ("doctor", "what this machine has: compilers, cache, extras, platforms"),
+    "completion": ("completion", "completion of commands and options for a shell"),
 }
-"""Module of this package, and what it does."""
-_INTERRUPTED = 130
-"""Status of a command that was interrupted from the keyboard, as shells have it."""
+"""Module of this package and of `cosim.cli.options`, and what it does."""
+STATUSES = "Exit status: 0 done, 1 failed, 2 wrong usage, 3 stopped by a Zeno guard, 130 interrupted from the keyboard."
+EXAMPLES = ("hybrid-fmu paper", "hybrid-fmu simulate paper-a", "hybrid-fmu export file.py:ClassName --out fmus")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -42,40 +41,98 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit status: 0 done, 1 failed, 2 wrong usage, 3 stopped by a Zeno guard.
+        Exit status: 0 done, 1 failed, 2 wrong usage, 3 stopped by a Zeno guard, 130 interrupted from the keyboard.
     """
-    _write_any_name()
-    parser = argparse.ArgumentParser(
-        prog="hybrid-fmu",
-        description="Hybrid automata: run them event-exactly, export them as FMUs, co-simulate them.",
-        allow_abbrev=False,
-    )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
-    given = sys.argv[1:] if arguments is None else arguments
-    called = next((word for word in given if not word.startswith("-")), None)
-    if called is not None and called not in _COMMANDS:
-        parser.error(
-            f"there is no command '{called}'.{suggestion(called, _COMMANDS)} Commands: {', '.join(_COMMANDS)}."
-        )
-    for name, (module, purpose) in _COMMANDS.items():
-        command = commands.add_parser(name, help=purpose, allow_abbrev=False)
-        # Some take long to import.
-        if name == called:
-            importlib.import_module(f"cosim.cli.{module}").add_arguments(command)
-    options = parser.parse_args(arguments)
     try:
-        return int(options.run(options))
-    except (ScenarioError, UsageError, NamingError) as error:
-        return _report(error, Exit.USAGE)
+        _write_any_name()
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        called = next((word for word in given if not word.startswith("-")), None)
+        options = parser_of((called,) if called in COMMANDS else (), called).parse_args(given)
+        module = COMMANDS[options.command][0]
+        # What is wrong with a name shows before the imports that take long.
+        getattr(importlib.import_module(f"cosim.cli.options.{module}"), "require_named", bool)(options)
+        status = int(importlib.import_module(f"cosim.cli.{module}").run(options))
+        sys.stdout.flush()
+        return status
     except KeyboardInterrupt:
-        return _INTERRUPTED
+        print("hybrid-fmu: interrupted.", file=sys.stderr)
+        return int(Exit.INTERRUPTED)
     except BrokenPipeError:
         # Whoever read the output has seen enough; Python's own attempt to flush it would fail once more.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return int(Exit.DONE)
-    except (HybridModelError, ExportError, BuildError, CosimError, OSError) as error:
-        return _report(error, Exit.FAILED)
+    except Exception as error:
+        # Most of what may be raised is imported by whoever raises it.
+        from cosim.cli.failures import status_of
+
+        failed = status_of(error)
+        if failed is None:
+            raise
+        print(f"hybrid-fmu: {error}", file=sys.stderr)
+        return int(failed)
+
+
+def parser_of(complete: Sequence[str], called: str | None = None) -> argparse.ArgumentParser:
+    """Return the parser of the command line.
+
+    Parameters
+    ----------
+    complete : sequence of str
+        Commands that have their options; others are names in a list.
+    called : str, optional
+        The command that was called; one that there is not ends the process with a suggestion.
+    """
+    parser = _Parser(
+        prog="hybrid-fmu",
+        description="Hybrid automata: run them event-exactly, export them as FMUs, co-simulate them.",
+        epilog=f"{_epilog(EXAMPLES)}\n'hybrid-fmu COMMAND --help' lists the options of a command, with examples.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action=_Version, nargs=0, help="print the version")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND", dest="command")
+    if called is not None and called not in COMMANDS:
+        near = difflib.get_close_matches(called, COMMANDS, n=1)
+        meant = f" Did you mean '{near[0]}'?" if near else ""
+        parser.error(f"there is no command '{called}'.{meant} Commands: {', '.join(COMMANDS)}.")
+    for name, (module, purpose) in COMMANDS.items():
+        known = importlib.import_module(f"cosim.cli.options.{module}") if name in complete else None
+        command = commands.add_parser(
+            name,
+            help=purpose,
+            description=getattr(known, "DESCRIPTION", f"{purpose[0].upper()}{purpose[1:]}."),
+            epilog=_epilog(known.EXAMPLES) if known else None,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        if known:
+            known.add_arguments(command)
+    return parser
+
+
+def _epilog(examples: Sequence[str]) -> str:
+    return "\n".join(["examples:", *(f"  {example}" for example in examples), "", STATUSES])
+
+
+class _Parser(argparse.ArgumentParser):
+    """Answers a value that an option cannot have by one sentence, as everything else that is refused."""
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse what was typed."""
+        option, _, what = message.removeprefix("argument ").partition(": ")
+        if option != message and what:
+            raise UsageError(f"{option}: {what[0].lower()}{what[1:]}." if what[0] != "'" else f"{option} {what}.")
+        super().error(message)
+
+
+class _Version(argparse.Action):
+    """Prints the version: it is in a package that takes longer to import than the rest of the command line."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        from hybrid_model import __version__
+
+        print(f"{parser.prog} {__version__}")
+        parser.exit()
 
 
 def _write_any_name() -> None:
@@ -83,11 +140,6 @@ def _write_any_name() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-
-
-def _report(error: Exception, status: Exit) -> int:
-    print(f"hybrid-fmu: {error}", file=sys.stderr)
-    return int(status)
 
 
 if __name__ == "__main__":

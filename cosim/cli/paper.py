@@ -12,7 +12,9 @@ from typing import Any
 import numpy as np
 
 import hybrid_model as hm
-from cosim.cli.exits import exit_of, progress
+from cosim.cli.exits import exit_of
+from cosim.cli.outputs import results_folder
+from cosim.cli.progress import Work
 from cosim.consensus import fmu_system, in_process_system, network_report
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.result import CosimResult
@@ -33,6 +35,10 @@ FIXED_STEPS = (0.1, 0.01, 0.001)
 """Communication steps in s of the comparison: what people use."""
 COMPARE_INTERVAL = 0.5
 """In s: states of the executions are compared at multiples of this time."""
+_EXPORT, _EXACT, _FIXED, _BOUNDS, _FIGURES = 1.0, 2.0, 0.01, 4.0, 8.0
+"""About how long stages take: parts of the whole; a fixed step takes `_FIXED` over its length."""
+_AGENTS = 4
+_WORK = 2 * (1.0 + _AGENTS * _EXPORT + _EXACT + sum(_FIXED / step for step in FIXED_STEPS) + _BOUNDS) + _FIGURES
 
 
 @dataclass(frozen=True)
@@ -63,35 +69,33 @@ class Comparison:
     certificates: Certificates
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument("--out", type=Path, default=Path("results"), metavar="DIR", help="folder for all results")
-    parser.set_defaults(run=run)
-
-
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     dynamic = load_scenario(PRESET)
     scenarios = {"static": replace_trigger(dynamic, "static"), "dynamic": dynamic}
     # Both have one network: what is known of it is computed once.
     analysis = analyse(scenarios["static"])
-    comparisons = {kind: _compare(kind, scenario, analysis, options.out) for kind, scenario in scenarios.items()}
-    progress("drawing the figures")
-    for kind, comparison in comparisons.items():
-        save_paper_figures(kind, comparison.scenario, comparison.arc, list(comparison.bounds.values()), options.out)
-    summary = options.out / "summary.json"
-    summary.write_text(json.dumps(_summary(comparisons), indent=2) + "\n", encoding="utf-8")
-    print(_table(comparisons))
-    print(f"\nFigures, FMUs and summary.json are in {options.out}.")
+    with Work(_WORK) as work, results_folder(options.out, "paper") as out:
+        comparisons = {kind: _compare(kind, scenario, analysis, out, work) for kind, scenario in scenarios.items()}
+        work.begin("drawing the figures", _FIGURES)
+        for kind, comparison in comparisons.items():
+            save_paper_figures(kind, comparison.scenario, comparison.arc, list(comparison.bounds.values()), out)
+        document = json.dumps(_summary(comparisons), indent=2)
+        (out / "summary.json").write_text(document + "\n", encoding="utf-8")
+    if options.json:
+        print(document)
+    else:
+        print(_table(comparisons))
+        print(f"\nFigures, FMUs and summary.json are in {options.out}.")
     return max(exit_of(comparison.report.stop) for comparison in comparisons.values())
 
 
-def _compare(kind: str, scenario: Scenario, analysis: Analysis, out: Path) -> Comparison:
-    progress(f"{kind}: running as one automaton")
+def _compare(kind: str, scenario: Scenario, analysis: Analysis, out: Path, work: Work) -> Comparison:
+    work.begin(f"{kind}: running as one automaton")
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
     report = run_report(scenario, arc)
-    fmus = _export(kind, scenario, out)
-    progress(f"{kind}: co-simulating, event-exact")
+    fmus = _export(kind, scenario, out, work)
+    work.begin(f"{kind}: co-simulating, event-exact", _EXACT)
     # One system for all its runs: each FMU is unpacked and loaded once.
     systems = {"automata in one process": in_process_system(scenario), "FMUs through fmpy": fmu_system(scenario, fmus)}
     exact = [
@@ -100,24 +104,28 @@ def _compare(kind: str, scenario: Scenario, analysis: Analysis, out: Path) -> Co
         )
         for name, system in systems.items()
     ]
+
+    def watch(result: CosimResult) -> None:
+        work.part(result.times[-1] / scenario.stop_time)
+
     fixed = {}
     for step in FIXED_STEPS:
-        progress(f"{kind}: co-simulating, fixed step {step:g} s")
+        work.begin(f"{kind}: co-simulating, fixed step {step:g} s", _FIXED / step)
         counters = [f"{name}.events" for name in fmus]
-        result = run_fixed_step(systems["FMUs through fmpy"], scenario.stop_time, step, record=counters)
+        result = run_fixed_step(systems["FMUs through fmpy"], scenario.stop_time, step, record=counters, watch=watch)
         fixed[step] = _fixed_trial(step, scenario, report, result)
     bounds = {form: convergence_bound(scenario, form) for form in BoundForm}
-    progress(f"{kind}: computing the bounds")
+    work.begin(f"{kind}: computing the bounds", _BOUNDS)
     names = [str(path.relative_to(out)) for path in fmus.values()]
     return Comparison(scenario, arc, report, names, exact, fixed, bounds, certify(scenario, arc, like=analysis))
 
 
-def _export(kind: str, scenario: Scenario, out: Path) -> dict[str, Path]:
+def _export(kind: str, scenario: Scenario, out: Path, work: Work) -> dict[str, Path]:
     folder = out / "fmus" / kind
     folder.mkdir(parents=True, exist_ok=True)
     fmus = {}
     for name, automaton in scenario_agents(scenario).items():
-        progress(f"{kind}: exporting {name}")
+        work.begin(f"{kind}: exporting {name}", _EXPORT)
         fmus[name] = export_fmu(automaton, folder / f"{name}.fmu", stop_time=scenario.stop_time)
     return fmus
 

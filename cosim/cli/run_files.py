@@ -4,44 +4,18 @@ from __future__ import annotations
 
 import argparse
 import csv
-import sys
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from cosim.cli.exits import Exit
+from cosim.cli.progress import Work
 from cosim.result import CosimResult
 from cosim.system import System
 from cosim.tables.comparison import deviations
 from cosim.tables.picture import draw
 from cosim.tables.row_file import Columns, RowFile
-
-QUIET, EVERY = 2.0, 0.5
-"""Seconds of a run before its progress is told, and between two lines of it."""
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options."""
-    parser.add_argument(
-        "--output-file",
-        type=Path,
-        metavar="F.csv",
-        help="write all outputs over time, with both rows of a jump; rows are there as soon as they are known",
-    )
-    parser.add_argument("--event-log", type=Path, metavar="F.csv", help="write the events: time, component, clocks")
-    parser.add_argument(
-        "--reference-file", type=Path, metavar="REF.csv", help="compare with a table; status 1 if they differ"
-    )
-    parser.add_argument(
-        "--reference-tolerance",
-        type=float,
-        default=1e-3,
-        metavar="PART",
-        help="of the largest value of each variable, for --reference-file; default: 1e-3",
-    )
-    parser.add_argument("--plot", type=Path, metavar="F.png", help="draw the outputs")
-    parser.add_argument("--show-plot", action="store_true", help="draw them in a window")
+from fmu.archives.writing import replacing
 
 
 class RunFiles:
@@ -65,7 +39,8 @@ class RunFiles:
         self._title = single or "co-simulation"
         columns = Columns(system.output_names, self._arrays, self._short)
         self._rows = RowFile(options.output_file, columns) if options.output_file else None
-        self._began = self._told = time.monotonic()
+        self._work = Work().__enter__()
+        self._work.begin(self._title)
         self.result: CosimResult | None = None
 
     def watch(self, result: CosimResult) -> None:
@@ -73,50 +48,42 @@ class RunFiles:
         self.result = result
         if self._rows is not None:
             self._rows.take(result)
-        now = time.monotonic()
-        if now - self._began > QUIET and now - self._told > EVERY:
-            self._told = now
-            self._tell(result, now - self._began)
+        start, now = result.times[0], result.times[-1]
+        if self._t_stop > start:
+            told = f"t = {now:.6g} of {self._t_stop:.6g} s, {len(result.events)} events"
+            self._work.part((now - start) / (self._t_stop - start), told)
 
     def close(self) -> None:
         """Write what is left of the rows; further files are for runs that came to an end."""
         if self._rows is not None:
             self._rows.close()
-        if self._told > self._began and sys.stderr.isatty():
-            print(file=sys.stderr)
+        self._work.__exit__(None, None, None)
 
-    def finish(self, result: CosimResult) -> int:
-        """Write the other files, and compare; return the exit status that this gives."""
+    def finish(self, result: CosimResult) -> tuple[int, list[str]]:
+        """Write the other files, and compare; return the exit status that this gives, and what was compared."""
         signals = self._named(result.signals)
         if self._options.event_log:
             _write_events(self._options.event_log, result)
         if self._options.plot or self._options.show_plot:
             draw(result.times, signals, self._title, self._options.plot, show=self._options.show_plot)
         if self._options.reference_file is None:
-            return int(Exit.DONE)
+            return int(Exit.DONE), []
         return self._compare(result.times, signals)
 
     def _named(self, signals: Mapping[str, Sequence[Any]]) -> dict[str, Sequence[Any]]:
         return {self._short[name]: values for name, values in signals.items()}
 
-    def _compare(self, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> int:
-        tolerance, worst = self._options.reference_tolerance, Exit.DONE
+    def _compare(self, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> tuple[int, list[str]]:
+        tolerance, worst, lines = self._options.reference_tolerance, Exit.DONE, []
         compared, missing = deviations(self._options.reference_file, times, signals)
         if missing:
-            print(f"  not compared, as the run has none of that form: {', '.join(missing)}")
+            lines.append(f"  not compared, as the run has none of that form: {', '.join(missing)}")
         for found in compared:
             beyond = not found.largest <= tolerance
             worst = Exit.FAILED if beyond else worst
             line = f"{found.name} differs from {self._options.reference_file.name} by {found.largest:.3g} of its size"
-            print(f"  {line}, at {found.t:.9g} s{f': beyond {tolerance:g}' if beyond else ''}")
-        return int(worst)
-
-    def _tell(self, result: CosimResult, seconds: float) -> None:
-        start, now = result.times[0], result.times[-1]
-        if sys.stderr.isatty() and now > start:
-            left = seconds * (self._t_stop - now) / (now - start)
-            text = f"  t = {now:.6g} of {self._t_stop:.6g} s, {len(result.events)} events, {left:.0f} s left   "
-            print(f"\r{text}", end="", file=sys.stderr, flush=True)
+            lines.append(f"  {line}, at {found.t:.9g} s{f': beyond {tolerance:g}' if beyond else ''}")
+        return int(worst), lines
 
 
 def _write_events(path: Path, result: CosimResult) -> None:
@@ -124,8 +91,7 @@ def _write_events(path: Path, result: CosimResult) -> None:
     for tick in result.ticks:
         ticks.setdefault((tick.t, tick.slave), []).append(tick.clock)
     places = sorted({(event.t, event.block) for event in result.events} | set(ticks))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["time", "component", "clocks"])
         writer.writerows([t, slave, " ".join(ticks.get((t, slave), []))] for t, slave in places)

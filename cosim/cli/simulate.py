@@ -5,22 +5,21 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import json
-import sys
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import hybrid_model as hm
 from cosim.cli.exits import exit_of, write_csv
-from cosim.cli.scenarios import scenario_of
+from cosim.cli.outputs import results_folder
+from cosim.cli.progress import Work
 from cosim.errors import UsageError
-from cosim.masters.start import require_times
 from hybrid_model.consensus.laws.agent_network import agent_network
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
 from hybrid_model.consensus.runs.report import RunReport, report_of_network, run_report
 from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.files import load_scenario
 
 AUTOMATON_AGENTS = 8
 """Up to this many agents `auto` runs the closed loop as one automaton; beyond, event by event over the network."""
@@ -33,47 +32,26 @@ MOST_POINTS = 1e7
 """Of a trajectory; one that is longer fills the memory."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument("scenario", metavar="SCENARIO", help="name of a preset, or path of a TOML file")
-    parser.add_argument(
-        "--engine",
-        choices=("auto", "automaton", "network"),
-        default="auto",
-        help="automaton: the closed loop as one automaton; network: agent by agent, event by event",
-    )
-    parser.add_argument("--stop-time", type=float, help="end of the run in s, instead of the scenario's")
-    parser.add_argument("--output-interval", type=float, default=0.1, help="spacing of the trajectory in s")
-    parser.add_argument("--json", action="store_true", help="print the run as a JSON object")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="write run.json and trajectory.csv there")
-    parser.add_argument(
-        "--events",
-        type=Path,
-        metavar="DIR",
-        help="write the events of a network there as they come (hybrid_model.load_network_events reads them)",
-    )
-    parser.set_defaults(run=run)
-
-
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
-    scenario = scenario_of(options.scenario)
-    require_times(0.0, scenario.stop_time, options.output_interval, "output interval")
+    scenario = load_scenario(options.scenario)
     if options.stop_time is not None:
         scenario = dataclasses.replace(scenario, stop_time=options.stop_time)
     _require_points(scenario.stop_time, options.output_interval)
     one = options.engine == "automaton" or (options.engine == "auto" and scenario.network.agents <= AUTOMATON_AGENTS)
     if one and options.events:
         raise UsageError("--events goes with --engine network: one automaton keeps its run in memory.")
-    if one:
-        report, times, signals = _as_one(scenario, options.output_interval, bool(options.out))
-    else:
-        report, times, signals = _as_network(scenario, options.output_interval, bool(options.out), options.events)
+    with Work() as work:
+        work.begin(f"running {scenario.name}")
+        if one:
+            report, times, signals = _as_one(scenario, options.output_interval, bool(options.out))
+        else:
+            report, times, signals = _as_network(scenario, options, work)
     document = json.dumps({"scenario": scenario.name, **report.as_dict(), "message": report.message}, indent=2)
     if options.out:
-        options.out.mkdir(parents=True, exist_ok=True)
-        (options.out / "run.json").write_text(document + "\n", encoding="utf-8")
-        write_csv(options.out / "trajectory.csv", times, signals)
+        with results_folder(options.out, "simulate") as folder:
+            (folder / "run.json").write_text(document + "\n", encoding="utf-8")
+            write_csv(folder / "trajectory.csv", times, signals)
     print(document if options.json else _text(scenario, report))
     return exit_of(report.stop)
 
@@ -111,18 +89,20 @@ def _both_sides(times: Any, jumps: Any) -> tuple[Any, Any]:
     return rows, before
 
 
-def _as_network(
-    scenario: Scenario, interval: float, wanted: bool, events: Path | None
-) -> tuple[RunReport, Any, dict[str, Any]]:
-    told = sys.stderr.isatty()
-    run = hm.simulate_network(agent_network(scenario), scenario.stop_time, events_to=events, progress=told)
+def _as_network(scenario: Scenario, options: argparse.Namespace, work: Work) -> tuple[RunReport, Any, dict[str, Any]]:
+    interval, end = options.output_interval, scenario.stop_time
+
+    def told(t: float, events: int) -> None:
+        work.part(t / end, f"t = {t:.6g} of {end:.6g} s, {events} events")
+
+    run = hm.simulate_network(agent_network(scenario), end, events_to=options.events, progress=told)
     times, jumps = np.minimum(np.arange(int(np.ceil(run.t / interval)) + 1) * interval, run.t), np.unique(run.events.t)
     if scenario.network.agents * len(jumps) > MOST_AT_EVENTS:
         jumps = jumps[:0]
     times = np.union1d(times, jumps)
     rows, before = _both_sides(times, np.isin(times, jumps))
     signals = {}
-    for name, arc in run.arcs.items() if wanted else ():
+    for name, arc in run.arcs.items() if options.out else ():
         # The others end at their last event where one agent ends the run.
         reached = np.minimum(rows, arc.t[-1])
         for item in ("x", "broadcast"):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.cli.exits import progress
+from cosim.cli.progress import Work
 from cosim.consensus import fmu_system
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.result import CosimResult
@@ -32,7 +32,7 @@ SMALLEST = 1e-16
 """Errors of zero are drawn here."""
 
 
-def study(scenario: Scenario, out: Path, steps: Sequence[float] = STEPS) -> list[Path]:
+def study(scenario: Scenario, out: Path, steps: Sequence[float] = STEPS, work: Work | None = None) -> list[Path]:
     """Run a scenario's agents with fixed steps and with error control; write how far they are from the exact run.
 
     Parameters
@@ -42,24 +42,27 @@ def study(scenario: Scenario, out: Path, steps: Sequence[float] = STEPS) -> list
         Folder for the FMUs, the table and the figure.
     steps : sequence of float
         Communication steps in s.
+    work : Work, optional
+        Told how far it is.
 
     Returns
     -------
     list of Path
         The table and the figure.
     """
+    work = work or Work()
     out.mkdir(parents=True, exist_ok=True)
-    fmus = {version: _export(scenario, version, out) for version in ("3.0", "2.0")}
+    fmus = {version: _export(scenario, version, out, work) for version in ("3.0", "2.0")}
     names = list(fmus["3.0"])
     recorded = [f"{name}.x" for name in names]
-    progress("event-exact")
+    work.begin("event-exact", 0.0)
     exact = run_event_exact(fmu_system(scenario, fmus["3.0"]), scenario.stop_time, output_interval=COMPARE_INTERVAL)
     wanted = _states(exact, recorded)
     rows: list[tuple[str, str, float | None, float]] = []
     for kind, version_of in VERSIONS.items():
         chosen = {name: fmus[version_of(k)][name] for k, name in enumerate(names)}
         for step in steps:
-            progress(f"{kind}: steps of {step:g} s")
+            work.begin(f"{kind}: steps of {step:g} s", 1.0 / step / len(VERSIONS) / sum(1.0 / s for s in steps))
             result = run_fixed_step(
                 fmu_system(scenario, chosen),
                 scenario.stop_time,
@@ -69,7 +72,7 @@ def study(scenario: Scenario, out: Path, steps: Sequence[float] = STEPS) -> list
             )
             rows.append((kind, "fixed-step", step, _distance(result, recorded, wanted)))
         if kind != "FMI 3.0":
-            progress(f"{kind}: error-controlled")
+            work.begin(f"{kind}: error-controlled", 0.0)
             result = run_error_controlled(
                 fmu_system(scenario, chosen),
                 scenario.stop_time,
@@ -82,10 +85,10 @@ def study(scenario: Scenario, out: Path, steps: Sequence[float] = STEPS) -> list
     return [out / TABLE, out / FIGURE]
 
 
-def _export(scenario: Scenario, version: str, out: Path) -> dict[str, Path]:
+def _export(scenario: Scenario, version: str, out: Path, work: Work) -> dict[str, Path]:
     fmus = {}
     for name, automaton in scenario_agents(scenario).items():
-        progress(f"exporting {name} for FMI {version}")
+        work.begin(f"exporting {name} for FMI {version}", 0.0)
         fmus[name] = export_fmu(automaton, out / f"{name}-fmi{version[0]}.fmu", fmi=version, kinds=("cs",))
     return fmus
 

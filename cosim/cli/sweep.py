@@ -3,83 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 
-from cosim.cli.eta import Eta
 from cosim.cli.exits import Exit
+from cosim.cli.progress import Work
 from cosim.errors import UsageError
 from hybrid_model.consensus.figures.study import save_study_figures
-from hybrid_model.consensus.sweeps.designs import Design
 from hybrid_model.consensus.sweeps.errors import SweepError
 from hybrid_model.consensus.sweeps.execute import run_sweep
 from hybrid_model.consensus.sweeps.export import write_csv, write_parquet
-from hybrid_model.consensus.sweeps.study import BOUND_NAMES, Study, study
+from hybrid_model.consensus.sweeps.study import Study, study
 from hybrid_model.consensus.sweeps.table import SweepTable
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of the command."""
-    parser.add_argument(
-        "scenario",
-        metavar="SCENARIO",
-        help="name of a preset, path of a TOML file, or the .sqlite file of a sweep to go on with",
-    )
-    parser.add_argument(
-        "--vary",
-        action="append",
-        default=[],
-        metavar="KEY=VALUES",
-        help="a key of the scenario and its values: low:high:count, low:high:count:log, a,b,c, a list in TOML, or "
-        "seeds; repeatable",
-    )
-    parser.add_argument(
-        "--design",
-        choices=[design.value for design in Design],
-        default=Design.GRID.value,
-        help="which points are run (default %(default)s)",
-    )
-    parser.add_argument("--runs", type=int, metavar="N", help="number of points that are drawn")
-    parser.add_argument("--repeats", type=int, default=1, metavar="N", help="runs of each point, with other seeds")
-    parser.add_argument("--seed", type=int, default=0, help="of draws and of seeds (default %(default)s)")
-    parser.add_argument(
-        "--bounds",
-        default="",
-        metavar="NAMES",
-        help=f"columns with certified values, separated by commas, out of {', '.join(BOUND_NAMES)}",
-    )
-    parser.add_argument(
-        "--max-jumps",
-        metavar="N",
-        type=int,
-        default=20_000,
-        help="jumps (broadcasts and breakpoints) after which a run ends (default %(default)s)",
-    )
-    parser.add_argument(
-        "--table",
-        type=Path,
-        metavar="F.sqlite",
-        help="file of the rows; a sweep that ended early is gone on with (default: the scenario's name)",
-    )
-    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one a processor)")
-    parser.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask scheduler, whose workers run instead")
-    parser.add_argument("--csv", type=Path, metavar="F.csv", help="write the rows there at the end")
-    parser.add_argument("--parquet", type=Path, metavar="F.parquet", help="write the rows there at the end")
-    parser.add_argument(
-        "--figures",
-        type=Path,
-        metavar="DIR",
-        help="write maps over the first two keys there, and broadcasts against radii of a sweep over thresholds",
-    )
-    parser.set_defaults(run=run)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     try:
         wanted, path = _study(options)
-        eta = Eta("runs")
-        with run_sweep(wanted, path, workers=options.workers, scheduler=options.scheduler, progress=eta) as table:
+        with (
+            Work() as work,
+            run_sweep(wanted, path, workers=options.workers, scheduler=options.scheduler, progress=work) as table,
+        ):
             if options.csv:
                 write_csv(table, options.csv)
             if options.parquet:
@@ -91,7 +37,8 @@ def run(options: argparse.Namespace) -> int:
             failures, count = table.failures, len(table)
     except SweepError as error:
         raise UsageError(str(error)) from error
-    print(f"{path}: {count} runs, {failures} failed" if failures else f"{path}: {count} runs")
+    told = f"{path}: {count} runs, {failures} failed" if failures else f"{path}: {count} runs"
+    print(json.dumps({"table": str(path), "runs": count, "failed": failures}, indent=2) if options.json else told)
     return Exit.DONE
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from cosim.errors import UsageError
 from hybrid_model import Automaton
 from hybrid_model.declare.automaton import require_made
+from hybrid_model.errors import DeclarationError
 from hybrid_model.named_objects import named_object
 
 
@@ -39,7 +40,9 @@ def find_automaton(target: str, starts: Mapping[str, Any]) -> Automaton:
         raise UsageError(f"{target} is not an automaton class: derive it from hybrid_model.HybridAutomaton.")
     try:
         automaton = found(**starts)
-    except TypeError as error:
-        raise UsageError(f"{target} cannot be made with the start values given: {error}.") from error
+    except (TypeError, DeclarationError) as error:
+        if not starts:
+            raise
+        raise UsageError(f"{target} cannot be made with the start values given: {str(error).rstrip('.')}.") from error
     require_made(automaton)
     return automaton

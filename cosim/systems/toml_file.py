@@ -62,7 +62,7 @@ def read_toml(path: str | Path) -> SystemDefinition:
 def _document(path: str | Path) -> dict[str, Any]:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise MisfitError(f"{path} cannot be read as TOML: {error}") from error
 
 

@@ -60,8 +60,9 @@ if TYPE_CHECKING:
     from hybrid_model.consensus.runs.savings import Savings, run_savings
     from hybrid_model.consensus.scenario.channel import Channel
     from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
-    from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
+    from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
     from hybrid_model.consensus.scenario.own_trigger import OwnTrigger
+    from hybrid_model.consensus.scenario.sources import preset_names
     from hybrid_model.consensus.scenario.trigger import Threshold, Trigger, TriggerKind
     from hybrid_model.consensus.switching.cycle import PeriodicSwitching
     from hybrid_model.consensus.switching.joint_connectivity import joint_connectivity_window

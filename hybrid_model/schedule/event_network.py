@@ -31,6 +31,7 @@ from hybrid_model.reference.execution import Execution
 from hybrid_model.schedule.automaton_block import AutomatonBlock
 from hybrid_model.schedule.network_arrays import Network
 from hybrid_model.schedule.network_run import NetworkRun
+from hybrid_model.schedule.progress import Told
 from hybrid_model.schedule.scheduler import Scheduler
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
@@ -53,7 +54,7 @@ def simulate_network(
     zeno: ZenoGuard | None = None,
     engine: str = "auto",
     events_to: str | os.PathLike[str] | None = None,
-    progress: bool = False,
+    progress: Told = False,
 ) -> NetworkRun:
     """Run a composition whose parts exchange discrete signals only, part by part.
 
@@ -77,8 +78,8 @@ def simulate_network(
     events_to : path, optional
         A new folder to which events go as they come (native engine only), for `load_network_events`; a run that is
         interrupted leaves what it has. Default: memory, and files in a passing folder where they become many.
-    progress : bool
-        Whether to tell on stderr how far the run is (native engine only).
+    progress : bool or callable
+        Whether to tell on stderr how far the run is; or who is told, ``progress(t, events)`` (native engine only).
 
     Returns
     -------

@@ -22,7 +22,7 @@ from hybrid_model.schedule.network_arrays import Network
 from hybrid_model.schedule.network_events import NetworkEvents
 from hybrid_model.schedule.network_run import NetworkRun
 from hybrid_model.schedule.part_table import PartTable, table_of, table_of_arrays
-from hybrid_model.schedule.progress import Progress
+from hybrid_model.schedule.progress import Progress, Told
 from hybrid_model.schedule.rebuilt_arcs import EventTable, RebuiltArcs
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
@@ -56,7 +56,7 @@ def native_network_run(
     zeno: ZenoGuard,
     *,
     events_to: str | os.PathLike[str] | None,
-    progress: bool,
+    progress: Told,
 ) -> NetworkRun:
     """Run a network on the scheduler in C.
 
@@ -93,7 +93,7 @@ def _run_once(
     solver: Solver,
     zeno: ZenoGuard,
     events_to: str | os.PathLike[str] | None,
-    progress: bool,
+    progress: Told,
     *,
     stiff: bool,
 ) -> NetworkRun:

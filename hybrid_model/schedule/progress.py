@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
+
+Told = bool | Callable[[float, int], None]
 
 
 class Progress:
@@ -13,13 +16,13 @@ class Progress:
     ----------
     span : (float, float)
         Of the run, in s.
-    wanted : bool
-        Whether to tell anything.
+    wanted : bool or callable
+        Whether to tell anything; or who is told, ``told(t, events)``, in place of stderr.
     every : float
         In s of the clock.
     """
 
-    def __init__(self, span: tuple[float, float], *, wanted: bool, every: float = 1.0) -> None:
+    def __init__(self, span: tuple[float, float], *, wanted: Told, every: float = 1.0) -> None:
         self._span, self._wanted, self._every = span, wanted, every
         self._began = self._told = time.monotonic()
         self._events = 0
@@ -27,6 +30,9 @@ class Progress:
     def note(self, t: float, events: int) -> None:
         """So many more events have happened, up to `t` in s."""
         self._events += events
+        if callable(self._wanted):
+            self._wanted(t, self._events)
+            return
         now = time.monotonic()
         if not self._wanted or now - self._told < self._every:
             return

@@ -76,7 +76,7 @@ def test_thresholds_that_vanish_too_fast_are_named_and_cut_the_run(scenario, cap
     assert "beta below the Floquet rate' fails" in notes
     assert "The run ended before the stop time" in notes
     assert main(["certify", path, "--max-jumps", "0"]) == 2
-    assert "--max-jumps 0: give a whole number of jumps, 1 or more." in capsys.readouterr().err
+    assert "--max-jumps '0': give a whole number, 1 or more." in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

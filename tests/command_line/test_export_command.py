@@ -148,9 +148,7 @@ def test_a_class_whose_constructor_leaves_its_base_out(here, capsys):
     "option", [["--fmi", "1.0"], ["--kind", "se"], ["--platform", "linux64"], ["--platform", "x86_64-beos"]]
 )
 def test_unknown_versions_kinds_and_platforms_are_wrong_usage(here, capsys, option):
-    with pytest.raises(SystemExit) as exit_:
-        main(["export", "fading:Decay", *option, "--out", "out"])
-    assert exit_.value.code == 2
+    assert main(["export", "fading:Decay", *option, "--out", "out"]) == 2
     assert option[1] in capsys.readouterr().err
 
 
@@ -198,7 +196,7 @@ def test_progress_is_for_terminals_only(here, capsys, monkeypatch):
     assert capsys.readouterr().err == ""
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     assert main(["export", "fading:Decay", "--out", "out"]) == 0
-    assert "exporting Decay (1 of 1)" in capsys.readouterr().err
+    assert "exporting Decay ..." in capsys.readouterr().err
 
 
 def test_clocks_can_be_left_out(here):
@@ -215,10 +213,8 @@ def test_clocks_can_be_left_out(here):
 @pytest.mark.parametrize("option", ["--stop-time", "--step-size"])
 @pytest.mark.parametrize("value", ["0", "-1", "nan", "inf", "soon"])
 def test_times_that_no_experiment_has_are_wrong_usage(here, capsys, option, value):
-    with pytest.raises(SystemExit) as stopped:
-        main(["export", "fading:Decay", f"{option}={value}", "--out", "out"])
-    assert stopped.value.code == 2
-    assert f"{value!r} is not a finite number of seconds above zero" in capsys.readouterr().err
+    assert main(["export", "fading:Decay", f"{option}={value}", "--out", "out"]) == 2
+    assert f"{option} {value!r}: give a positive, finite number of seconds." in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("times", [{"stop_time": math.nan}, {"stop_time": -1.0}, {"step_size": 0.0}])
@@ -228,10 +224,10 @@ def test_times_that_no_experiment_has_are_refused_by_the_exporter(here, times):
     assert not (here / "ball.fmu").exists()
 
 
-def test_an_interrupted_command_ends_quietly(here, monkeypatch, capsys):
+def test_an_interrupted_command_ends_with_one_line(here, monkeypatch, capsys):
     def interrupt(*arguments, **options):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("cosim.cli.export.export_fmu", interrupt)
     assert main(["export", "fading:Decay", "--out", "out"]) == 130
-    assert capsys.readouterr().err == ""
+    assert capsys.readouterr().err == "hybrid-fmu: interrupted.\n"

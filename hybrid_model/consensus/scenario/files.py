@@ -1,14 +1,12 @@
 """Scenario files: TOML in, checked scenario out; presets by name."""
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from hybrid_model.consensus.entries import Entries, suggestion
+from hybrid_model.consensus.entries import Entries
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.channel import IDEAL, Channel
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights, replace_trigger
@@ -16,23 +14,16 @@ from hybrid_model.consensus.scenario.own_trigger import read_own_trigger
 from hybrid_model.consensus.scenario.read_network import KEYS as NETWORK_KEYS
 from hybrid_model.consensus.scenario.read_network import read_network
 from hybrid_model.consensus.scenario.read_switching import read_switching
+from hybrid_model.consensus.scenario.sources import preset_names, scenario_source
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind, trigger_keys
 from hybrid_model.consensus.switching.base import NoSwitching, Switching
 from hybrid_model.consensus.weights.kinds import read_weights
 
-__all__ = ["load_scenario", "preset_names", "read_scenario", "scenario_entries"]
+__all__ = ["load_scenario", "read_scenario", "scenario_entries"]
 
 TOP_KEYS = ("name", "stop_time", "network", "weights", "switching", "trigger", "channel")
 CHANNEL_KEYS = ("delay", "loss", "seed", "slots")
 MOST_CHANGES = 1e7
-_PRESETS = resources.files("hybrid_model.consensus.scenario") / "presets"
-
-
-def preset_names() -> tuple[str, ...]:
-    """Names of the scenarios that come with the package, sorted."""
-    return tuple(
-        sorted(entry.name.removesuffix(".toml") for entry in _PRESETS.iterdir() if entry.name.endswith(".toml"))
-    )
 
 
 def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
@@ -52,7 +43,7 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     other = _with_other_trigger(name_or_path)
     if other is not None:
         return replace(replace_trigger(load_scenario(other[0]), other[1]), name=os.fspath(name_or_path))
-    source, entries, folder = _source(name_or_path)
+    source, entries, folder = scenario_source(name_or_path)
     try:
         return read_scenario(entries, folder)
     except ScenarioError as error:
@@ -80,7 +71,7 @@ def scenario_entries(name_or_path: str | os.PathLike[str]) -> tuple[dict[str, An
             trigger.pop("decay", None)
         trigger["kind"] = other[1].value
         return {**entries, "name": os.fspath(name_or_path), "trigger": trigger}, folder
-    _, entries, folder = _source(name_or_path)
+    _, entries, folder = scenario_source(name_or_path)
     return entries, folder
 
 
@@ -91,21 +82,6 @@ def _with_other_trigger(name_or_path: str | os.PathLike[str]) -> tuple[str, Trig
     if base not in names or name in names or kind not in [member.value for member in TriggerKind]:
         return None
     return base, TriggerKind(kind)
-
-
-def _source(name_or_path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], Path]:
-    """What a scenario is read from, as messages call it; its entries; and the folder of its files."""
-    name = os.fspath(name_or_path)
-    if not isinstance(name_or_path, str) or name.endswith(".toml") or os.path.dirname(name):
-        source = f"the scenario file {Path(name)}"
-        return source, _parsed(source, _content(Path(name))), Path(name).parent
-    names = preset_names()
-    if name in names:
-        return f"preset '{name}'", _parsed(f"preset '{name}'", (_PRESETS / f"{name}.toml").read_bytes()), Path()
-    raise ScenarioError(
-        f"there is no preset '{name}'.{suggestion(name, names)} Presets: {', '.join(names)}; "
-        "a scenario file is given by a path that ends in .toml."
-    )
 
 
 def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Scenario:
@@ -163,25 +139,6 @@ def require_affordable(scenario: Scenario) -> None:
                 f"{table} {key} makes about {count:.1g} changes up to stop_time, {end:.6g} s; a run can have at most "
                 f"{MOST_CHANGES:.0g}, so change {key} or stop_time."
             )
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise ScenarioError(f"the scenario file {path} cannot be read: {error.strerror}.") from error
-
-
-def _parsed(source: str, content: bytes) -> dict[str, Any]:
-    try:
-        return tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"{source} is not a text in UTF-8: byte {error.start} cannot be decoded.") from error
-    except ValueError as error:
-        # Of the parser, or of Python for an integer with thousands of digits.
-        raise ScenarioError(f"{source} is not valid TOML: {str(error).partition(';')[0]}.") from error
-    except RecursionError as error:
-        raise ScenarioError(f"{source} is not valid TOML: its tables or lists are nested too deeply.") from error
 
 
 def _subtable(top: Entries, name: str, known: tuple[str, ...] | None) -> Entries:

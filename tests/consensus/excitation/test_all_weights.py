@@ -18,7 +18,8 @@ from hybrid_model.consensus.excitation.persistence import (
     window_extremes,
 )
 from hybrid_model.consensus.excitation.trees import tree_excitations
-from hybrid_model.consensus.scenario.files import load_scenario, preset_names
+from hybrid_model.consensus.scenario.files import load_scenario
+from hybrid_model.consensus.scenario.sources import preset_names
 from hybrid_model.consensus.switching.base import NoSwitching
 from hybrid_model.consensus.weights.edge_weights import EdgeWeights
 from hybrid_model.consensus.weights.function import FunctionWeight

@@ -16,7 +16,8 @@ from hybrid_model.consensus.excitation.persistence import Signal, signal_factor
 from hybrid_model.consensus.graphs.undirected import complete_edges
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.runs.report import edge_norm, run_report
-from hybrid_model.consensus.scenario.files import load_scenario, preset_names
+from hybrid_model.consensus.scenario.files import load_scenario
+from hybrid_model.consensus.scenario.sources import preset_names
 from hybrid_model.consensus.weights.gated_sine import WeightMap
 
 DOCS = Path(__file__).parents[3] / "docs"

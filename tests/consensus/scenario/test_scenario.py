@@ -10,7 +10,8 @@ from hybrid_model.consensus.graphs.undirected import complete_edges
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Underlying, replace_trigger
-from hybrid_model.consensus.scenario.files import load_scenario, preset_names, read_scenario
+from hybrid_model.consensus.scenario.files import load_scenario, read_scenario
+from hybrid_model.consensus.scenario.sources import preset_names
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.switching.base import NoSwitching
 from hybrid_model.consensus.switching.cycle import SwitchingCycle
