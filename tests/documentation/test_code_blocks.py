@@ -11,7 +11,7 @@ import matplotlib
 import pytest
 from page_code import Reader, blocks
 
-from cosim.cli.main import _COMMANDS as COMMANDS
+from cosim.cli.main import COMMANDS
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import read_scenario
 
@@ -64,5 +64,5 @@ def test_commands_that_are_not_run_have_options_that_exist(page):
                 assert words[1] in targets
             elif words[0] == "hybrid-fmu":
                 parser = argparse.ArgumentParser(exit_on_error=False, allow_abbrev=False)
-                importlib.import_module(f"cosim.cli.{COMMANDS[words[1]][0]}").add_arguments(parser)
+                importlib.import_module(f"cosim.cli.options.{COMMANDS[words[1]][0]}").add_arguments(parser)
                 parser.parse_args(words[2:])
