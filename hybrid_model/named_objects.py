@@ -68,9 +68,8 @@ def _suggested(error: Exception, name: str) -> str:
     """A sentence with the class that was meant, or all classes of the module."""
     module = error.obj if isinstance(error, AttributeError) else None
     own = getattr(module, "__name__", None)
-    names = [
-        key for key, value in vars(module or object).items() if isinstance(value, type) and value.__module__ == own
-    ]
+    inside = [key for key, it in vars(module or object).items() if isinstance(it, type) and it.__module__ == own]
+    names = [*inside, *getattr(module, "__all__", ())]
     near = difflib.get_close_matches(name, names, n=1)
     return f"Did you mean '{near[0]}'?" if near else f"Its classes: {', '.join(names[:10])}." if names else ""
 

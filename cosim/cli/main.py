@@ -119,10 +119,10 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Refuse what was typed."""
+        if not message.startswith("argument "):
+            super().error(message)
         option, _, what = message.removeprefix("argument ").partition(": ")
-        if option != message and what:
-            raise UsageError(f"{option}: {what[0].lower()}{what[1:]}." if what[0] != "'" else f"{option} {what}.")
-        super().error(message)
+        raise UsageError(f"{option} {what}." if what.startswith("'") else f"{option}: {what}.")
 
 
 class _Version(argparse.Action):

@@ -60,6 +60,8 @@ class FmuFile:
                 f"{name}: {path} cannot be read as an FMU: {error}\n`hybrid-fmu validate` says more; validate=False "
                 "(--no-validate) goes on all the same."
             ) from error
+        except FileNotFoundError as error:
+            raise CosimError(f"{name}: there is no file {path}: give the path of an FMU.") from error
         except Exception as error:
             raise CosimError(f"{name}: {path} cannot be read as an FMU: {error}") from error
         self.kind, self.interface = kind, getattr(self.description, kind[0].lower() + kind[1:])

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
+from lxml import etree
 
 from fmu.archives.reading import Archive
 from fmu.importer.plain_xml import require_plain
@@ -36,13 +37,27 @@ def read_description(path: str | Path, *, validate: bool = True) -> Any:
         If the archive must not be extracted.
     PlainXmlError
         If its description has a DOCTYPE, or is not in UTF-8.
+    LoadError
+        If it is of FMI 1.0, which fmpy reads as far as it fits.
     Exception
         Whatever fmpy raises for a description that it cannot read.
     """
     with Archive(path) as archive:
         if DESCRIPTION in archive.names:
-            require_plain(archive.read(DESCRIPTION), DESCRIPTION)
+            text = archive.read(DESCRIPTION)
+            require_plain(text, DESCRIPTION)
+            if version := _older(text):
+                raise LoadError(f"It is of FMI {version}, and FMI 2.0 and 3.0 are run here: export it as one of them.")
         return read_model_description(str(path), validate=validate)
+
+
+def _older(description: bytes) -> str:
+    """The version of a description of FMI 1; nothing for any other, or if it is no XML."""
+    try:
+        version = str(etree.fromstring(description).get("fmiVersion", ""))
+    except etree.XMLSyntaxError:
+        return ""
+    return version if version.startswith("1.") else ""
 
 
 def major_of(description: Any) -> int | None:

@@ -127,7 +127,12 @@ def require_named(options: argparse.Namespace) -> None:
     if given.suffix.lower() in (".fmu", ".ssp", ".ssd"):
         require_file(given, "an FMU or a system")
     elif not given.is_dir() and not (given.is_file() and is_system(given)):
-        require_scenario(argparse.Namespace(scenario=options.system))
+        require_scenario(argparse.Namespace(scenario=options.system, out=options.step_study))
+        start = options.start_time or 0.0
+        if options.stop_time is not None and not options.stop_time > start:
+            raise UsageError(
+                f"--stop-time {options.stop_time:g}: the run starts at {start:g} s; give the stop after the start."
+            )
     for file in (options.input_file, options.reference_file):
         if file is not None:
             require_file(file, "a table of comma-separated values")

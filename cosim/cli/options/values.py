@@ -93,6 +93,7 @@ def require_scenario(options: argparse.Namespace) -> None:
     ScenarioError
         If there is no such scenario.
     """
+    require_folder(getattr(options, "out", None))
     given = options.scenario
     kind = Path(given).suffix.lower()
     if kind == ".fmu":
@@ -123,6 +124,18 @@ def is_code(given: str) -> bool:
     """Whether an argument names a Python file, or something in a module."""
     suffix = Path(given).suffix.lower()
     return suffix == ".py" or (":" in given and suffix != ".toml")
+
+
+def require_folder(given: Path | None) -> None:
+    """Refuse a folder for results that cannot be one, before the run rather than after it.
+
+    Raises
+    ------
+    UsageError
+        If there is a file in its place.
+    """
+    if given is not None and next((p for p in (given, *given.parents) if p.exists()), Path()).is_file():
+        raise UsageError(f"{given} cannot be a folder for results, since there is a file: give another.")
 
 
 def require_file(given: Path, what: str) -> None:

@@ -27,6 +27,8 @@ def scenario_source(name_or_path: str | os.PathLike[str]) -> tuple[str, dict[str
     if not isinstance(name_or_path, str) or name.endswith(".toml") or os.path.dirname(name):
         source = f"the scenario file {Path(name)}"
         return source, _parsed(source, _content(Path(name))), Path(name).parent
+    if os.path.isdir(name):
+        raise ScenarioError(f"{name} is a folder: give the path of a scenario file in it, which ends in .toml.")
     names = preset_names()
     if name in names:
         return f"preset '{name}'", _parsed(f"preset '{name}'", (_PRESETS / f"{name}.toml").read_bytes()), Path()
@@ -40,7 +42,8 @@ def _content(path: Path) -> bytes:
     try:
         return path.read_bytes()
     except OSError as error:
-        raise ScenarioError(f"the scenario file {path} cannot be read: {error.strerror}.") from error
+        near = "" if path.exists() else suggestion(path.stem, [file.stem for file in path.parent.glob("*.toml")])
+        raise ScenarioError(f"the scenario file {path} cannot be read: {error.strerror}.{near}") from error
 
 
 def _parsed(source: str, content: bytes) -> dict[str, Any]:
