@@ -9,6 +9,7 @@ import itertools
 import numpy as np
 import pytest
 from catalogue import Case, cases
+from drawing import examples
 from executions import python_run, reference, values_of
 from fmi_driver.binary import OK, Binary
 from fmi_driver.component import Component, Step
@@ -103,7 +104,7 @@ def test_every_model_in_every_way(name, exported):
 UNIT = st.floats(0.0, 1.0)
 
 
-@settings(max_examples=25, deadline=None, phases=[Phase.explicit, Phase.generate])
+@settings(examples(8, 25), phases=[Phase.explicit, Phase.generate])
 @given(data=st.data())
 def test_random_automata_in_every_way(data, binary):
     draw = lambda low, high: low + (high - low) * data.draw(UNIT)  # noqa: E731

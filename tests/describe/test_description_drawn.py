@@ -2,7 +2,8 @@
 
 import pytest
 from description_cases import BOTH, described, drawn_automata, elements, findings, schema
-from hypothesis import HealthCheck, given, settings
+from drawing import examples
+from hypothesis import given
 from lxml import etree
 
 from fmu.describe.model_description import model_description
@@ -20,7 +21,7 @@ def folder(tmp_path_factory):
 
 
 @given(drawn_automata())
-@settings(max_examples=20, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@examples(6, 20)
 def test_drawn_automata(folder, automaton):
     for fmi in BOTH:
         try:

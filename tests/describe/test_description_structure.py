@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from catalogue import cases
 from description_cases import BOTH, described
-from hypothesis import given, settings
+from drawing import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 import hybrid_model as hm
@@ -195,7 +196,7 @@ def grown(tree):
 
 
 @given(st.lists(TREES, min_size=1, max_size=3), st.integers(0, 2**31))
-@settings(deadline=None, max_examples=100)
+@examples(25, 100)
 def test_kinds_hold_for_numbers(trees, seed):
     """A factor that is called constant is one number at all points, a fixed one at all points with the same p, ..."""
     function = ca.Function("drawn", ARGUMENTS, [ca.vertcat(*map(grown, trees))])

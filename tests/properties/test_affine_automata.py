@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from drawing import examples
 from drawn_automata import compare, exponentials, modal_systems, parabolas, piecewise_linear, rotations
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
@@ -21,11 +22,11 @@ import hybrid_model as hm
 # time + state/slope. Straight lines and parabolas are exact but for some ten roundings of numbers near 10, and crossing
 # times are quotients by slopes of 1/8 and more; the others have the solver's error, 1e-13 a step, over up to 12 flows.
 FAMILIES = {
-    "piecewise linear": (piecewise_linear, 150, 5500, 1e-12, 1e-13),
-    "parabolas": (parabolas, 100, 3000, 1e-12, 1e-12),
-    "exponentials": (exponentials, 50, 2500, 1e-11, 1e-11),
-    "rotations": (rotations, 40, 1200, 1e-11, 1e-11),
-    "modal systems": (modal_systems, 40, 1200, 1e-11, 1e-11),
+    "piecewise linear": (piecewise_linear, 50, 5500, 1e-12, 1e-13),
+    "parabolas": (parabolas, 60, 3000, 1e-12, 1e-12),
+    "exponentials": (exponentials, 20, 2500, 1e-11, 1e-11),
+    "rotations": (rotations, 15, 1200, 1e-11, 1e-11),
+    "modal systems": (modal_systems, 15, 1200, 1e-11, 1e-11),
 }
 SOLVERS = [hm.Solver(), hm.Solver(max_step=0.25), hm.Solver(max_step=1 / 3)]
 
@@ -117,7 +118,7 @@ def wave_crossings(omega, phase, level, t_end):
     return [(t, name) for t, name in events if 0.0 < t < t_end]
 
 
-@settings(max_examples=20, deadline=None)
+@examples(8, 20)
 @given(st.integers(4, 250), st.integers(0, 62), st.integers(-9, 9))
 def test_every_crossing_of_a_wave_in_one_step_is_found(omega, phase, level):
     # Up to 20 crossings in steps that grow to the whole run: nothing in the state tells the solver of them.
@@ -143,7 +144,7 @@ class Turning(Wave):
         return s.x - s.level
 
 
-@settings(max_examples=15, deadline=None)
+@examples(6, 15)
 @given(st.integers(0, 62), st.integers(-8, 8), st.sampled_from([1e-3, 1e-5, 1e-7]))
 def test_every_crossing_of_a_rotation_in_coarse_steps_is_found(phase, level, rtol):
     omega, phase, level, t_end = 3.0, phase / 10 + 0.003, level / 10 + 0.001, 10.0

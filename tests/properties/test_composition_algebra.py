@@ -10,7 +10,8 @@ from itertools import groupby, permutations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from drawing import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 import hybrid_model as hm
@@ -121,7 +122,7 @@ def flat_names(arc):
     return [(jump.t, jump.name.removeprefix("inner."), *jump.x_after, *jump.z_after) for jump in arc.jumps]
 
 
-@settings(max_examples=20, deadline=None)
+@examples(5, 20)
 @given(networks())
 def test_composition_is_associative_up_to_names(network):
     parts, wires = network
@@ -138,7 +139,7 @@ def test_composition_is_associative_up_to_names(network):
             assert np.array_equal(arc.end[variable.name], flat.end[variable.name.removeprefix("inner.")])
 
 
-@settings(max_examples=20, deadline=None)
+@examples(5, 20)
 @given(networks(), st.sampled_from(list(permutations("abc"))[1:]))
 def test_the_order_of_parts_decides_only_the_order_within_an_instant(network, order):
     parts, wires = network
@@ -149,7 +150,7 @@ def test_the_order_of_parts_decides_only_the_order_within_an_instant(network, or
         assert other.end[variable.name] == pytest.approx(one.end[variable.name], abs=STATE)
 
 
-@settings(max_examples=20, deadline=None)
+@examples(5, 20)
 @given(networks(wired=False))
 def test_a_product_of_strangers_is_each_of_them_alone(network):
     parts, _ = network
@@ -163,7 +164,7 @@ def test_a_product_of_strangers_is_each_of_them_alone(network):
             assert together.end[f"{name}.{variable.name}"] == pytest.approx(alone.end[variable.name], abs=STATE)
 
 
-@settings(max_examples=10, deadline=None)
+@examples(3, 10)
 @given(networks(size=4), st.sampled_from(["ab", "bc", "cd", "abc", "bcd"]))
 def test_four_parts_bracketed_anyhow(network, inside):
     parts, wires = network

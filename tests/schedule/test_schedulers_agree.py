@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from drawing import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_scenarios import TRIGGERS, random_scenario
@@ -50,7 +51,7 @@ def assert_scenario_alike(seed, trigger, channel, t_end):
 
 
 # Few, and short: each is compiled, and the scheduler in Python takes some ten milliseconds an event.
-@settings(max_examples=3, deadline=None)
+@examples(2, 3)
 @given(seed=st.integers(0, 10**6), trigger=st.sampled_from(KINDS), channel=st.sampled_from(sorted(CHANNELS)))
 def test_random_scenarios(seed, trigger, channel):
     assert_scenario_alike(seed, trigger, channel, 0.7)
@@ -188,7 +189,7 @@ class Talker(hm.HybridAutomaton):
     )
 
 
-@settings(max_examples=4, deadline=None)
+@examples(2, 4)
 @given(data=st.data(), count=st.integers(1, 4), by=st.sampled_from(["sent", "answer"]))
 def test_random_wires(data, count, by):
     assert_wired_alike(data, count, by, 1.0)

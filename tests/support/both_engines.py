@@ -9,8 +9,12 @@ import hybrid_model as hm
 
 
 def on_both_engines(metafunc):
-    """What `pytest_generate_tests` of a room does: the tests of modules that run something do so twice."""
-    if "simulate(" in inspect.getsource(metafunc.module) and "engine" not in metafunc.fixturenames:
+    """What `pytest_generate_tests` of a room does: the tests of modules that run something do so twice.
+
+    Tests that ask for an engine themselves run once.
+    """
+    runs = "simulate(" in inspect.getsource(metafunc.module) and "engine=" not in inspect.getsource(metafunc.function)
+    if runs and "engine" not in metafunc.fixturenames:
         metafunc.fixturenames.append("engine")
         metafunc.parametrize("engine", ["auto", "python"], indirect=True, scope="module")
 

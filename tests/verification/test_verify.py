@@ -26,7 +26,7 @@ from hybrid_model.models import BouncingBall, RelayHysteresis, Thermostat, TwoTa
 
 G, E = 9.81, 0.7
 SLOW = ("paper", "agent", "control", "vehicle", "ring", "absolute", "moving_agents", "double_integrators")
-"""Models of seconds: a quarter of their run is verified by default, the whole with the long tests."""
+"""Models of seconds: a tenth of their run is verified by default, the whole with the long tests."""
 
 
 def rules(report):
@@ -52,7 +52,7 @@ def moved(samples, name, k, by):
 def test_the_simulators_arcs_are_hybrid_arcs(name):
     case = cases()[name]
     slow = name.startswith(SLOW)
-    arc = python_run(dataclasses.replace(case, t_end=case.t_end / 4)) if slow else reference(name)
+    arc = python_run(dataclasses.replace(case, t_end=case.t_end / 10)) if slow else reference(name)
     report = hm.verify(case.automaton, arc)
     assert report.ok, str(report)
     assert report.samples > 1

@@ -205,7 +205,7 @@ def test_some_random_runs():
     """One network of each kind of weights, with a kind of switching each."""
     seen = Seen()
     for seed, (weights, switching) in enumerate(zip(WEIGHTS, SWITCHING, strict=True)):
-        check_network(seed, 4, 5, seen, weights=weights, switching=switching)
+        check_network(seed, 3, 5, seen, weights=weights, switching=switching)
     assert seen.runs == 30
     assert all(seen.checked[f"trigger {kind.value}"] == 6 for kind in KINDS)
     assert seen.events > 500
@@ -215,7 +215,7 @@ def test_two_agents_violate_the_printed_gap():
     """With two agents, constant weight and little initial disagreement the printed gap fails in many runs."""
     random = np.random.default_rng(410)
     failed = 0
-    for _ in range(40):
+    for _ in range(20):
         weight, c = float(random.uniform(0.5, 2)), float(random.uniform(0.2, 0.8))
         scenario = read_scenario(
             {
@@ -230,7 +230,7 @@ def test_two_agents_violate_the_printed_gap():
         observed = exact_run(scenario).min_gap
         assert gaps.valid <= gaps.improved <= observed
         failed += gaps.printed > observed
-    assert failed > 10
+    assert failed > 5
 
 
 @pytest.mark.long

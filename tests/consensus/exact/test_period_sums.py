@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from drawing import examples
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hybrid_model.consensus.exact.period_sums import support_over_periods
@@ -29,7 +30,7 @@ def drawn(seed, size, slowest, spread, turning):
     return random.standard_normal((60, size)), monodromy, random.standard_normal((size, 5))
 
 
-@settings(max_examples=60, deadline=None)
+@examples(12, 60)
 @given(
     seed=st.integers(0, 10_000),
     size=st.integers(1, 5),

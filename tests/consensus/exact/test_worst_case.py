@@ -38,8 +38,8 @@ class TestExactWorstCase:
     @pytest.mark.parametrize("decay", [0.0, 0.06])
     def test_errors_exist_that_reach_the_radius_of_the_paper(self, decay):
         scenario = load_scenario("paper-a")
-        sets = ReachableSets(scenario, 2 * np.pi, decay, 0.02)
-        found = worst_case(scenario, 2 * np.pi, decay, 0.02)
+        sets = ReachableSets(scenario, 2 * np.pi, decay, 0.05)
+        found = worst_case(scenario, 2 * np.pi, decay, 0.05)
         index = int(np.argmin(np.abs(sets.times - found.time)))
         random = np.random.default_rng(1).standard_normal((3, 30))
         value, direction = sets.radius(index, random)

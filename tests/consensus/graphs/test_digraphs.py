@@ -37,8 +37,8 @@ def assert_contraction_holds(seed):
 
 
 def test_contraction_holds_in_a_random_search():
-    """Seeds 0 to 59; the long test goes on to 2499."""
-    cases = [assert_contraction_holds(seed) for seed in range(60)]
+    """Seeds 0 to 19; the long test goes on to 2499."""
+    cases = [assert_contraction_holds(seed) for seed in range(20)]
     # The search is not idle: many cases contract by the bound, and many have no excitation in some direction.
     assert sum(bound < 0.99 for _, bound in cases) > 8
     assert sum(bound == 1.0 for _, bound in cases) > 0
@@ -46,7 +46,7 @@ def test_contraction_holds_in_a_random_search():
 
 @pytest.mark.long
 def test_contraction_holds_in_a_long_random_search():
-    for seed in range(60, 2500):
+    for seed in range(20, 2500):
         assert_contraction_holds(seed)
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from catalogue_triggers import RING
+from drawing import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from law_runs import compare, reported, reported_by_agents, run
@@ -30,7 +31,7 @@ def drawn(seed, slots=16, **options):
     return random_scenario(seed, kind, channel=channel, **options)
 
 
-@settings(max_examples=10, deadline=None)
+@examples(2, 10)
 @given(seed=SEEDS)
 def test_a_run_over_a_channel_is_the_exact_one(seed):
     scenario = drawn(seed)
@@ -40,7 +41,7 @@ def test_a_run_over_a_channel_is_the_exact_one(seed):
     assert lost == exact.lost
 
 
-@settings(max_examples=4, deadline=None)
+@examples(2, 4)
 @given(seed=SEEDS)
 def test_agents_that_meet_at_events_only_run_the_same(seed):
     scenario = drawn(seed, stop_time=2.0)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from catalogue_triggers import RING
+from drawing import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from law_runs import compare, reported, reported_by_agents, run
@@ -36,14 +37,14 @@ def check(scenario, report, exact):
     compare(report, exact, [np.where(w > 0, 1e-13 / np.maximum(w, 1e-8), 0.0) for w in weights])
 
 
-@settings(max_examples=12, deadline=None)
+@examples(3, 12)
 @given(seed=SEEDS)
 def test_the_run_is_the_exact_event_triggered_one(seed):
     scenario = random_scenario(seed, "self-triggered")
     check(scenario, reported(scenario), exact_run(with_kind(scenario, TriggerKind.DYNAMIC)))
 
 
-@settings(max_examples=4, deadline=None)
+@examples(2, 4)
 @given(seed=SEEDS)
 def test_agents_that_meet_at_events_only_run_the_same(seed):
     scenario = random_scenario(seed, "self-triggered", stop_time=2.0)
@@ -134,7 +135,7 @@ def test_weights_whose_future_is_not_known_in_closed_form_are_refused():
         scenario_agents(scenario)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(25, 60)
 @given(
     seed=SEEDS,
     make=st.sampled_from(

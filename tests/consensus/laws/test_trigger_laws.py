@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from catalogue_triggers import RING
+from drawing import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from law_runs import compare, reported, reported_by_agents, run
@@ -28,7 +29,7 @@ def exact(scenario):
 
 
 @KINDS
-@settings(max_examples=8, deadline=None)
+@examples(2, 8)
 @given(seed=SEEDS)
 def test_a_law_runs_like_the_exact_solution(kind, seed):
     scenario = random_scenario(seed, kind)
@@ -36,7 +37,7 @@ def test_a_law_runs_like_the_exact_solution(kind, seed):
 
 
 @KINDS
-@settings(max_examples=4, deadline=None)
+@examples(1, 4)
 @given(seed=SEEDS)
 def test_a_law_runs_agent_by_agent_like_the_exact_solution(kind, seed):
     scenario = random_scenario(seed, kind, stop_time=2.0)

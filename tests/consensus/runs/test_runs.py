@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from drawing import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.exact_consensus import exact_run
@@ -131,14 +132,14 @@ def weights(edges):
     return st.one_of(st.fixed_dictionaries({"kind": st.just("constant"), "value": each}), gated)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(5, 25)
 @given(scenario=scenarios())
 def test_any_scenario_runs_like_the_exact_solution(scenario):
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
     compare(scenario, run_report(scenario, arc), exact_run(scenario))
 
 
-@settings(max_examples=15, deadline=None)
+@examples(3, 15)
 @given(scenario=scenarios())
 def test_any_scenario_runs_event_by_event_like_the_exact_solution(scenario):
     result = run_event_exact(in_process_system(scenario), scenario.stop_time)

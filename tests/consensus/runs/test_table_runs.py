@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from catalogue_weights import SWITCHING, WEIGHTS, ring
+from drawing import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from oracles.table_runs import table_run
@@ -78,7 +79,7 @@ def scenarios(draw):
     )
 
 
-@settings(max_examples=15, deadline=None)
+@examples(3, 15)
 @given(scenario=scenarios())
 def test_random_tables_run_like_the_exact_solution(scenario):
     compare(scenario, closed_loop(scenario))
