@@ -173,6 +173,8 @@ Answer instance_set(void *handle, const char *function, Type type, const Referen
     for (size_t i = 0, at = 0; i < n; i++)
         for (size_t k = 0; k < description.variables[references[i]].size; k++)
             write_element(instance, &description.variables[references[i]], k, load(values, at++));
+    if (instance_parts(instance))
+        assembled_follow(instance->parts);
     return ANSWER_OK;
 }
 

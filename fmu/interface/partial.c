@@ -18,7 +18,7 @@ static int place_of(const Variable *variable, bool known)
     }
 }
 
-/* The engine with the present state, whatever runs; NULL if it cannot be had. */
+/* The engine with the present state, whatever runs. */
 static Engine *whole(const Instance *instance)
 {
     return instance_parts(instance) ? assembled_whole(instance->parts) : instance->engine;
@@ -89,8 +89,6 @@ Answer instance_derivatives(void *handle, const char *function, const Direction 
         check_direction(instance, function, knowns, true) != ANSWER_OK)
         return ANSWER_ERROR;
     Engine *engine = whole(instance);
-    if (!engine)
-        return instance_refuse(instance, "%s: %s", instance->name, engine_problem(instance->engine));
     const Direction *from = forward ? knowns : unknowns, *to = forward ? unknowns : knowns;
     engine_seeds(engine, places);
     scatter(from, forward, places);
@@ -123,8 +121,6 @@ Answer instance_output_rates(void *handle, const char *function, const Reference
             return instance_refuse(instance, "%s: %s: derivatives of order %ld are not computed, only the first.",
                                    instance->name, function, (long)orders[i]);
     Engine *engine = whole(instance);
-    if (!engine)
-        return instance_refuse(instance, "%s: %s", instance->name, engine_problem(instance->engine));
     const double *rates = engine_values(engine, instance_view(instance), BANK_DERIVATIVE);
     if (!rates)
         return instance_refuse(instance, "%s: %s: %s", instance->name, function, engine_problem(engine));

@@ -71,6 +71,8 @@ Answer instance_save(void *handle, const char *function, void **state)
         saved = new_state(instance);
     if (!saved)
         return instance_refuse(instance, "%s: %s: out of memory.", instance->name, function);
+    if (instance->parts)
+        assembled_before_save(instance->parts);
     engine_save(instance->engine, saved->block);
     if (instance->parts)
         assembled_save(instance->parts, saved->block + whole_size(instance));

@@ -45,7 +45,8 @@ void engine_note_sizes(const Engine *engine, const Point *point)
 
 void engine_begin_anew(const Engine *engine, const Point *point)
 {
-    if (*point->step > 0.0)
+    /* Who only looks leaves no trace. */
+    if (*point->step > 0.0 && point->step != engine->shown.step)
         engine->status->stride = engine->method->segment_part * *point->step;
     *point->step = 0.0;
 }

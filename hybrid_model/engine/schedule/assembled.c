@@ -3,6 +3,7 @@
 
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 static void note_jump(void *context, double time, uint32_t part, size_t jump)
 {
@@ -84,12 +85,6 @@ bool assembled_over(Assembled *assembled)
     return engine_end_run(assembled->whole);
 }
 
-bool assembled_bring(Assembled *assembled, uint32_t part)
-{
-    Schedule *schedule = assembled->schedule;
-    return schedule_bring(schedule, part, schedule->t, part);
-}
-
 bool assembled_settle(Assembled *assembled, uint32_t *next)
 {
     Schedule *schedule = assembled->schedule;
@@ -113,6 +108,17 @@ bool assembled_settle(Assembled *assembled, uint32_t *next)
             return assembled_over(assembled);
     }
     return schedule_close(schedule) || assembled_over(assembled);
+}
+
+/* Of the whole's states nothing is kept that follows from the parts. */
+static void forget(Assembled *assembled)
+{
+    Engine *whole = assembled->whole;
+    const Model *m = whole->model;
+    engine_set_time(whole, engine_time(whole));
+    memset(whole->live.x, 0, (m->n_states + m->n_discrete) * sizeof(double));
+    memset(whole->live.size, 0, m->n_states * sizeof(double));
+    assembled->filled = assembled->mirrored = false;
 }
 
 /* The options of a run are those of the whole, and looking ahead far is for those who ask. */
@@ -145,6 +151,8 @@ bool assembled_begin(Assembled *assembled)
     const Assembly *of = assembled->of;
     Schedule *schedule = assembled->schedule;
     const Engine *whole = assembled->whole;
+    double start = engine_time(whole);
+    uint32_t next;
     const double *constants = of->constants;
     schedule_clear(schedule);
     share_options(assembled);
@@ -153,16 +161,23 @@ bool assembled_begin(Assembled *assembled)
     for (size_t k = 0; k < whole->model->n_inputs; k++)
         for (uint64_t j = of->first_heard[k]; j < of->first_heard[k + 1]; j++)
             schedule_inputs(schedule, of->heard[j].part)[of->heard[j].input] = whole->u[k];
-    assembled->mirrored = false;
+    forget(assembled);
     schedule->running = true;
-    return (schedule_start(schedule, engine_time(whole), whole->status->stop_time, false) &&
-            schedule_hand_out(schedule) && schedule_wake(schedule)) ||
-           assembled_over(assembled);
+    return (schedule_start(schedule, start, whole->status->stop_time, false) &&
+            schedule_hand_out(schedule) && schedule_wake(schedule))
+               ? assembled_settle(assembled, &next)
+               : assembled_over(assembled);
 }
 
 size_t assembled_state_size(const Assembled *assembled)
 {
     return schedule_state_size(assembled->schedule);
+}
+
+void assembled_before_save(Assembled *assembled)
+{
+    if (assembled->filled)
+        forget(assembled);
 }
 
 void assembled_save(Assembled *assembled, void *bytes)
@@ -174,7 +189,7 @@ void assembled_restore(Assembled *assembled, const void *bytes)
 {
     schedule_restore(assembled->schedule, bytes);
     share_options(assembled);
-    assembled->mirrored = false;
+    assembled->filled = assembled->mirrored = false;
 }
 
 bool assembled_state_is_sound(const Assembled *assembled, void *bytes)

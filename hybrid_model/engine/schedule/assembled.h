@@ -13,7 +13,8 @@ struct Assembled {
     Schedule *schedule;
     Engine *whole;
     double target;               /* of the present advance */
-    bool mirrored;               /* the whole shows the present state of all parts */
+    bool filled;                 /* the whole holds states of the parts, */
+    bool mirrored;               /* their present ones */
     JumpHook jump_hook;
     void *jump_context;
     StepHook hook;
@@ -25,8 +26,6 @@ bool assembled_over(Assembled *assembled);
 /* Receptions and breakpoints that are due without a jump; the part whose jump comes next, NOBODY if none does, and the
    instant is over. */
 bool assembled_settle(Assembled *assembled, uint32_t *next);
-/* Brings a part to the present time. */
-bool assembled_bring(Assembled *assembled, uint32_t part);
 
 #if defined(__GNUC__)
 #pragma GCC visibility pop

@@ -24,7 +24,7 @@ static uint32_t owner(const Assembly *of, Bank bank, size_t index, size_t *own)
 static void set(Assembled *assembled, uint32_t part, Bank bank, size_t index, double value)
 {
     Schedule *schedule = assembled->schedule;
-    if (!assembled_bring(assembled, part)) {
+    if (!schedule_bring(schedule, part, schedule->t, part)) {
         assembled_over(assembled);
         return;
     }
@@ -51,6 +51,12 @@ void assembled_set(Assembled *assembled, Bank bank, size_t index, double value)
         set(assembled, of->heard[k].part, bank, of->heard[k].input, value);
 }
 
+void assembled_follow(Assembled *assembled)
+{
+    uint32_t next;
+    assembled_settle(assembled, &next);
+}
+
 const double *assembled_values(Assembled *assembled, View view, Bank bank, size_t index)
 {
     Schedule *schedule = assembled->schedule;
@@ -58,22 +64,17 @@ const double *assembled_values(Assembled *assembled, View view, Bank bank, size_
     size_t own;
     if (bank == BANK_INPUT || bank == BANK_PARAMETER)
         return (bank == BANK_INPUT ? whole->u : whole->p) + index;
-    uint32_t part = owner(assembled->of, bank, index, &own), next = NOBODY;
-    if (view == VIEW_PENDING && (schedule->pending.count > 0 || schedule->n_touched > 0) &&
-        !assembled_settle(assembled, &next))
-        view = VIEW_LIVE;
-    if (next == NOBODY || (part != next && (bank == BANK_STATE || bank == BANK_DISCRETE)))
-        view = VIEW_LIVE;
-    else if (part != next) {
-        /* What others compute from the jump that comes next. */
-        const double *values = assembled_whole(assembled) ? engine_values(whole, view, bank) : NULL;
+    uint32_t part = owner(assembled->of, bank, index, &own);
+    uint32_t next = view == VIEW_PENDING && schedule->pending.count > 0 ? schedule->pending.parts[0] : NOBODY;
+    bool computed = bank != BANK_STATE && bank != BANK_DISCRETE;
+    if (next != NOBODY && computed) {
+        /* What is computed from the jump that comes next, and from what it sends. */
+        const double *values = engine_values(assembled_whole(assembled), view, bank);
         return values ? values + index : NULL;
     }
-    if (!assembled_bring(assembled, part)) {
-        assembled_over(assembled);
-        return NULL;
-    }
-    Engine *engine = schedule_at(schedule, part);
+    if (part != next)
+        view = VIEW_LIVE;
+    Engine *engine = schedule_peek(schedule, part, schedule->t);
     const double *values = engine_values(engine, view, bank);
     if (!values)
         engine_fail(whole, ENDED_FAILED, "%s", engine_problem(engine));
@@ -90,12 +91,8 @@ Engine *assembled_whole(Assembled *assembled)
     engine_set_time(whole, assembled->schedule->t);
     for (uint32_t i = 0; i < of->n_parts; i++) {
         const Places *at = &of->places[i];
-        Engine *engine = schedule_at(assembled->schedule, i);
+        Engine *engine = schedule_peek(assembled->schedule, i, assembled->schedule->t);
         const Model *part = engine->model;
-        if (!assembled_bring(assembled, i)) {
-            assembled_over(assembled);
-            return NULL;
-        }
         engine_catch_up(engine);
         engine_copy(whole->live.x + at->x, engine->live.x, part->n_states);
         engine_copy(whole->live.z + at->z, engine->live.z, part->n_discrete);
@@ -104,6 +101,6 @@ Engine *assembled_whole(Assembled *assembled)
         double *level = &whole->live.level[m->n_margins];
         *level = fmax(*level, engine->live.level[part->n_margins]);
     }
-    assembled->mirrored = true;
+    assembled->filled = assembled->mirrored = true;
     return whole;
 }

@@ -63,6 +63,8 @@ bool assembled_begin(Assembled *assembled);
 bool assembled_running(const Assembled *assembled);
 
 size_t assembled_state_size(const Assembled *assembled);
+/* Before the engine of the whole is saved: nothing is in it that follows from the parts. */
+void assembled_before_save(Assembled *assembled);
 void assembled_save(Assembled *assembled, void *bytes);
 void assembled_restore(Assembled *assembled, const void *bytes);
 bool assembled_state_is_sound(const Assembled *assembled, void *bytes);
@@ -70,9 +72,11 @@ bool assembled_state_is_sound(const Assembled *assembled, void *bytes);
 /* As the functions of the engine.  The whole has the messages of a run that is over, and which jumps have ticked. */
 double assembled_time(const Assembled *assembled);
 void assembled_set(Assembled *assembled, Bank bank, size_t index, double value);
+/* What follows from all that was set, up to a jump: to be called then. */
+void assembled_follow(Assembled *assembled);
 /* The values of a bank from element `index` on to the end of that part's. */
 const double *assembled_values(Assembled *assembled, View view, Bank bank, size_t index);
-/* The engine of the whole at the present state of all parts, until anything goes on; NULL if that fails. */
+/* The engine of the whole at the present state of all parts, until anything goes on. */
 Engine *assembled_whole(Assembled *assembled);
 size_t assembled_pending(Assembled *assembled);
 bool assembled_jump(Assembled *assembled, bool *states_changed);

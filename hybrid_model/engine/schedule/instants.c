@@ -15,6 +15,7 @@ static void note_touched(Schedule *schedule, uint32_t i)
 void schedule_touch(Schedule *schedule, uint32_t i)
 {
     Part *part = &schedule->parts[i];
+    schedule->groups[part->group].copied = NOBODY;
     note_touched(schedule, i);
     if (!part->pending)
         pending_add(&schedule->pending, i);
@@ -121,6 +122,7 @@ bool schedule_update(Schedule *schedule, double t)
     uint32_t i = pending_take(&schedule->pending);
     Part *part = &schedule->parts[i];
     part->pending = false;
+    schedule->groups[part->group].copied = NOBODY;
     bool again = false;
     if (++part->iterations > MOST_ITERATIONS)
         return schedule_refuse(schedule, i, "asks for more than %d event iterations at t = %.9g s.", MOST_ITERATIONS,

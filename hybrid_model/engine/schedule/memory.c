@@ -57,6 +57,7 @@ static bool make_group(Schedule *schedule, Group *group, const Model *maps, cons
     engine_set_jump_hook(engine, note_jump, schedule);
     group->home = engine->block;
     group->block_size = engine_block_size(engine);
+    group->copy = malloc(group->block_size);
     group->inputs_at = (size_t)((unsigned char *)(void *)engine->u - engine->block);
     group->signals = signals;
     group->n_signals = n_signals;
@@ -64,7 +65,7 @@ static bool make_group(Schedule *schedule, Group *group, const Model *maps, cons
         group->sends_outputs = group->sends_outputs || signals[k].bank == BANK_OUTPUT;
     if (n_signals > schedule->log.width)
         schedule->log.width = n_signals;
-    return true;
+    return group->copy != NULL;
 }
 
 static bool make_groups(Schedule *schedule, const Model *const models[], const size_t n_signals[],
@@ -117,6 +118,7 @@ void schedule_free(Schedule *schedule)
         if (group->engine)
             engine_use_block(group->engine, group->home);
         engine_free(group->engine);
+        free(group->copy);
     }
     log_free(&schedule->log);
     free(schedule->groups);
@@ -141,7 +143,7 @@ void schedule_clear(Schedule *schedule)
     }
     for (size_t k = 0; k < schedule->n_groups; k++) {
         Group *group = &schedule->groups[k];
-        group->present = NOBODY;
+        group->present = group->copied = NOBODY;
         /* Blocks as the engine's own is at its beginning. */
         memset(group->slab, 0, group->count * group->block_size);
         for (size_t i = 0; i < group->n_signals * group->count; i++)
@@ -167,11 +169,7 @@ void schedule_save(Schedule *schedule, void *bytes)
                            schedule->pending.count, schedule->n_touched, schedule->running};
     for (uint32_t i = 0; i < schedule->n_parts; i++)
         engine_catch_up(schedule_at(schedule, i));
-    for (size_t k = 0; k < schedule->n_groups; k++) {
-        const Group *group = &schedule->groups[k];
-        if (group->present != NOBODY)
-            schedule->parts[group->present].jumps = group->engine->statistics.jumps;
-    }
+    schedule_let_go(schedule);
     memcpy(bytes, &moment, sizeof moment);
     memcpy((unsigned char *)bytes + moment_size(), schedule->memory, schedule->size);
 }
@@ -190,7 +188,7 @@ void schedule_restore(Schedule *schedule, const void *bytes)
     schedule->running = moment.running != 0;
     schedule->end = SCHEDULE_GOING;
     for (size_t k = 0; k < schedule->n_groups; k++)
-        schedule->groups[k].present = NOBODY;
+        schedule->groups[k].present = schedule->groups[k].copied = NOBODY;
 }
 
 /* Whether a list of parts holds each of them at most once, and (which flag of a part tells) those that it should. */

@@ -2,6 +2,7 @@
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "schedule.h"
 
@@ -18,6 +19,20 @@ double *schedule_inputs(const Schedule *schedule, uint32_t i)
     return (double *)(void *)(schedule_block(schedule, i) + group->inputs_at);
 }
 
+static void let_go(Schedule *schedule, Group *group)
+{
+    /* Jumps are bounded part by part. */
+    if (group->present != NOBODY)
+        schedule->parts[group->present].jumps = group->engine->statistics.jumps;
+    group->present = NOBODY;
+}
+
+void schedule_let_go(Schedule *schedule)
+{
+    for (size_t k = 0; k < schedule->n_groups; k++)
+        let_go(schedule, &schedule->groups[k]);
+}
+
 Engine *schedule_at(Schedule *schedule, uint32_t i)
 {
     Part *part = &schedule->parts[i];
@@ -25,12 +40,32 @@ Engine *schedule_at(Schedule *schedule, uint32_t i)
     Engine *engine = group->engine;
     if (group->present == i)
         return engine;
-    /* Jumps are bounded part by part. */
-    if (group->present != NOBODY)
-        schedule->parts[group->present].jumps = engine->statistics.jumps;
+    let_go(schedule, group);
     engine_use_block(engine, schedule_block(schedule, i));
     engine->statistics.jumps = part->jumps;
     group->present = i;
+    return engine;
+}
+
+Engine *schedule_peek(Schedule *schedule, uint32_t i, double t)
+{
+    Part *part = &schedule->parts[i];
+    Group *group = &schedule->groups[part->group];
+    Engine *engine = group->engine;
+    if (part->t >= t || part->pending)
+        return schedule_at(schedule, i);
+    bool there = group->copied == i && group->copied_to == t;
+    if (there && engine->block == group->copy)
+        return engine;
+    let_go(schedule, group);
+    engine_use_block(engine, group->copy);
+    if (there)
+        return engine;
+    memcpy(group->copy, schedule_block(schedule, i), group->block_size);
+    group->copied = i;
+    group->copied_to = t;
+    while (engine_advance(engine, t, EVENTS_STOP) == ADVANCE_PAUSED)
+        ;
     return engine;
 }
 

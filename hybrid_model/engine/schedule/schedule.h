@@ -25,6 +25,9 @@ typedef struct {
     size_t block_size, inputs_at; /* where in a block its inputs lie */
     size_t count;
     uint32_t present;             /* the part on whose block the engine is */
+    unsigned char *copy;          /* of the block of a part, */
+    uint32_t copied;              /* this one, */
+    double copied_to;             /* brought to that time */
     const Signal *signals;        /* the caller's */
     size_t n_signals;
     bool sends_outputs;
@@ -118,6 +121,10 @@ void log_free(EventLog *log);
 /* parts.c: one part */
 /* The engine of a part's group, on the block of that part. */
 Engine *schedule_at(Schedule *schedule, uint32_t i);
+/* The same at t, on a copy where the part has to be brought there: whoever looks changes nothing. */
+Engine *schedule_peek(Schedule *schedule, uint32_t i, double t);
+/* The engines are on no part's block. */
+void schedule_let_go(Schedule *schedule);
 unsigned char *schedule_block(const Schedule *schedule, uint32_t i);
 /* Where the inputs of a part lie. */
 double *schedule_inputs(const Schedule *schedule, uint32_t i);
