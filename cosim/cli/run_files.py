@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from cosim.cli.exits import Exit
 from cosim.cli.progress import Work
 from cosim.result import CosimResult
@@ -16,6 +18,7 @@ from cosim.tables.comparison import deviations
 from cosim.tables.picture import draw
 from cosim.tables.row_file import Columns, RowFile
 from fmu.archives.writing import replacing
+from hybrid_model.record.column_files import write_columns
 
 
 class RunFiles:
@@ -38,7 +41,9 @@ class RunFiles:
             self._short = {name: name for name in self._short}
         self._title = single or "co-simulation"
         columns = Columns(system.output_names, self._arrays, self._short)
-        self._rows = RowFile(options.output_file, columns) if options.output_file else None
+        # Rows of text are there as they come; other tables are written at the end.
+        csv = options.output_file is not None and options.output_file.suffix.lower() == ".csv"
+        self._rows = RowFile(options.output_file, columns) if csv else None
         self._work = Work().__enter__()
         self._work.begin(self._title)
         self.result: CosimResult | None = None
@@ -62,6 +67,8 @@ class RunFiles:
     def finish(self, result: CosimResult) -> tuple[int, list[str]]:
         """Write the other files, and compare; return the exit status that this gives, and what was compared."""
         signals = self._named(result.signals)
+        if self._options.output_file and self._rows is None:
+            _write_table(self._options.output_file, result.times, signals)
         if self._options.event_log:
             _write_events(self._options.event_log, result)
         if self._options.plot or self._options.show_plot:
@@ -84,6 +91,12 @@ class RunFiles:
             line = f"{found.name} differs from {self._options.reference_file.name} by {found.largest:.3g} of its size"
             lines.append(f"  {line}, at {found.t:.9g} s{f': beyond {tolerance:g}' if beyond else ''}")
         return int(worst), lines
+
+
+def _write_table(path: Path, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> None:
+    numbers = {name: np.array(values) for name, values in signals.items()}
+    numbers = {name: column for name, column in numbers.items() if column.dtype.kind in "biuf"}
+    write_columns(path, {"time": np.array(times), **numbers}, {"time": "s"})
 
 
 def _write_events(path: Path, result: CosimResult) -> None:

@@ -20,6 +20,7 @@ from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop
 from hybrid_model.consensus.runs.report import RunReport, report_of_network, run_report
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.files import load_scenario
+from hybrid_model.record.column_files import write_columns
 
 AUTOMATON_AGENTS = 8
 """Up to this many agents `auto` runs the closed loop as one automaton; beyond, event by event over the network."""
@@ -44,7 +45,7 @@ def run(options: argparse.Namespace) -> int:
     with Work() as work:
         work.begin(f"running {scenario.name}")
         if one:
-            report, times, signals = _as_one(scenario, options.output_interval, bool(options.out))
+            report, times, signals = _as_one(scenario, options.output_interval, _wanted(options))
         else:
             report, times, signals = _as_network(scenario, options, work)
     document = json.dumps({"scenario": scenario.name, **report.as_dict(), "message": report.message}, indent=2)
@@ -52,8 +53,16 @@ def run(options: argparse.Namespace) -> int:
         with results_folder(options.out, "simulate") as folder:
             (folder / "run.json").write_text(document + "\n", encoding="utf-8")
             write_csv(folder / "trajectory.csv", times, signals)
+    if options.output_file:
+        table = {"time": np.array(times), **{name: np.array(values) for name, values in signals.items()}}
+        about = {"scenario": scenario.name, "stop": report.stop, "message": report.message}
+        write_columns(options.output_file, table, {"time": "s"}, about)
     print(document if options.json else _text(scenario, report))
     return exit_of(report.stop)
+
+
+def _wanted(options: argparse.Namespace) -> bool:
+    return bool(options.out or options.output_file)
 
 
 def _require_points(stop_time: float, interval: float) -> None:
@@ -102,7 +111,7 @@ def _as_network(scenario: Scenario, options: argparse.Namespace, work: Work) -> 
     times = np.union1d(times, jumps)
     rows, before = _both_sides(times, np.isin(times, jumps))
     signals = {}
-    for name, arc in run.arcs.items() if options.out else ():
+    for name, arc in run.arcs.items() if _wanted(options) else ():
         # The others end at their last event where one agent ends the run.
         reached = np.minimum(rows, arc.t[-1])
         for item in ("x", "broadcast"):

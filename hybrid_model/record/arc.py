@@ -13,10 +13,11 @@ import numpy.typing as npt
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.real_numbers import real_array, told
-from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, unknown_name
+from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, element_names, unknown_name
 from hybrid_model.errors import DataError, DeclarationError
 from hybrid_model.record.arc_file import read_record, write_record
 from hybrid_model.record.arc_tables import dataframe, dataset
+from hybrid_model.record.column_files import ENDINGS, replaced, write_columns
 from hybrid_model.record.flow_points import ends_of, held_in, sampled, sampled_states, starts_of, states_at
 from hybrid_model.record.flow_record import FlowRecord
 from hybrid_model.record.jump_record import JumpRecord
@@ -314,8 +315,9 @@ class HybridArc:
         Parameters
         ----------
         path : str or Path
-            ``*.npz``: the complete arc, which `load_arc` reads, see `hybrid_model.record.arc_file`. ``*.csv``: the
-            samples alone, which `Samples.from_csv` reads.
+            ``*.npz``: the complete arc, which `load_arc` reads, see `hybrid_model.record.arc_file`. The samples alone:
+            ``*.csv``, which `Samples.from_csv` reads, ``*.mat`` for MATLAB and Octave, ``*.nc``, netCDF-3, which
+            xarray opens; see `hybrid_model.record.column_files`.
 
         Raises
         ------
@@ -324,13 +326,20 @@ class HybridArc:
         """
         ending = Path(path).suffix.lower()
         if ending == ".csv":
-            self.samples().to_csv(path)
+            with replaced(Path(path)) as part:
+                self.samples().to_csv(part)
         elif ending == ".npz":
-            write_record(self._record, Path(path))
+            with replaced(Path(path)) as part:
+                write_record(self._record, part)
+        elif ending in ENDINGS:
+            samples = self.samples()
+            units = {e: v.unit for v in map(self._read.variable, samples.values) for e in element_names(v)}
+            about = {"automaton": self.automaton.name, "stop": self.stop.name, "message": self.message}
+            write_columns(path, {"t": samples.t, "j": samples.j, **samples.columns()}, {"t": "s", **units}, about)
         else:
             raise DataError(
-                f"{path} ends in {ending!r}, but an arc is saved as .npz, which hm.load_arc reads, or as .csv, its "
-                "samples alone: give one of these endings."
+                f"{path} ends in {ending!r}, but an arc is saved as .npz, which hm.load_arc reads, or as .csv, .mat or "
+                ".nc, its samples alone: give one of these endings."
             )
 
     def _table(self, names: Iterable[str] | None, t: FloatArray, x: FloatArray, z: FloatArray) -> dict[str, FloatArray]:

@@ -113,11 +113,11 @@ def test_completion_in_bash(capsys, tmp_path):
     (tmp_path / "c").write_text(capsys.readouterr().out)
     ask = (
         f"source {tmp_path}/c; f=$(complete -p hybrid-fmu | sed 's/.*-F \\([^ ]*\\).*/\\1/');"
-        'for line in "sim" "simulate --out" "simulate paper-a-dwell-t"; do COMP_WORDS=(hybrid-fmu $line);'
+        'for line in "sim" "simulate --output-i" "simulate paper-a-dwell-t"; do COMP_WORDS=(hybrid-fmu $line);'
         " COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); COMPREPLY=(); $f; echo ${COMPREPLY[@]}; done"
     )
     done = subprocess.run(["bash", "-c", ask], capture_output=True, text=True, check=False)
-    assert done.stdout.split("\n")[:3] == ["simulate", "--output-interval --out", "paper-a-dwell-two-pi"]
+    assert done.stdout.split("\n")[:3] == ["simulate", "--output-interval", "paper-a-dwell-two-pi"]
 
 
 def test_help_takes_little_time():

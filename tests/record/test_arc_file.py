@@ -294,7 +294,7 @@ def test_the_name_of_a_file_decides_what_is_written(tmp_path):
     assert hm.verify(BouncingBall(), back).ok
     with pytest.raises(hm.DataError, match=r"ball\.CSV holds samples alone, .*: read it by hm\.Samples\.from_csv"):
         hm.load_arc(tmp_path / "ball.CSV")
-    for name in ("ball.mat", "ball", "ball.json"):
+    for name in ("ball.xlsx", "ball", "ball.json"):
         with pytest.raises(hm.DataError, match=r"an arc is saved as \.npz, which hm\.load_arc reads, or as \.csv"):
             ball.save(tmp_path / name)
         assert not (tmp_path / name).exists()

@@ -5,7 +5,17 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cosim.cli.options.values import add_json, is_code, number, positive, require_file, require_scenario, seconds, whole
+from cosim.cli.options.values import (
+    add_json,
+    is_code,
+    number,
+    positive,
+    require_file,
+    require_scenario,
+    require_table,
+    seconds,
+    whole,
+)
 from cosim.errors import UsageError
 from cosim.systems.ssp_reading import VERSIONS
 from cosim.systems.toml_file import INTERFACES, is_system
@@ -133,6 +143,7 @@ def require_named(options: argparse.Namespace) -> None:
             raise UsageError(
                 f"--stop-time {options.stop_time:g}: the run starts at {start:g} s; give the stop after the start."
             )
+    require_table(options.output_file)
     for file in (options.input_file, options.reference_file):
         if file is not None:
             require_file(file, "a table of comma-separated values")
@@ -142,8 +153,9 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output-file",
         type=Path,
-        metavar="F.csv",
-        help="write all outputs over time, with both rows of a jump; rows are there as soon as they are known",
+        metavar="F",
+        help="write all outputs over time, with both rows of a jump; the name says how: .csv, whose rows are there as "
+        "soon as they are known, .npz, .mat or .nc",
     )
     parser.add_argument("--event-log", type=Path, metavar="F.csv", help="write the events: time, component, clocks")
     parser.add_argument(

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
-from cosim.cli.options.values import add_folder, add_json, add_scenario, require_scenario, seconds
+from cosim.cli.options.values import add_folder, add_json, add_scenario, require_scenario, require_table, seconds
 
 EXAMPLES = (
     "hybrid-fmu simulate paper-a",
     "hybrid-fmu simulate paper-a --stop-time 10 --out run",
+    "hybrid-fmu simulate paper-a --output-file run.mat",
     "hybrid-fmu simulate ring.toml --engine network --events events",
 )
 
@@ -32,6 +34,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="spacing of the trajectory in s (default: %(default)s)",
     )
     add_json(parser, "the run")
+    parser.add_argument(
+        "--output-file", type=Path, metavar="F", help="write the trajectory there: .csv, .npz, .mat or .nc by the name"
+    )
     add_folder(parser, "--out", "write run.json and trajectory.csv there")
     add_folder(
         parser,
@@ -40,4 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-require_named = require_scenario
+def require_named(options: argparse.Namespace) -> None:
+    """Refuse what is no scenario, and files of other kinds than are written."""
+    require_scenario(options)
+    require_table(options.output_file)

@@ -10,6 +10,9 @@ from pathlib import Path
 from cosim.errors import UsageError
 from cosim.systems.toml_file import is_system
 
+TABLES = (".csv", ".npz", ".mat", ".nc")
+"""Endings of the tables that are written."""
+
 
 def number(text: str) -> float:
     """A finite number."""
@@ -136,6 +139,20 @@ def require_folder(given: Path | None) -> None:
     """
     if given is not None and next((p for p in (given, *given.parents) if p.exists()), Path()).is_file():
         raise UsageError(f"{given} cannot be a folder for results, since there is a file: give another.")
+
+
+def require_table(given: Path | None) -> None:
+    """Refuse a table of a kind that is not written.
+
+    Raises
+    ------
+    UsageError
+        With the kinds that there are.
+    """
+    if given is not None and given.suffix.lower() not in TABLES:
+        raise UsageError(
+            f"{given} ends in {given.suffix!r}: tables are written as {', '.join(TABLES)}; give one of these endings."
+        )
 
 
 def require_file(given: Path, what: str) -> None:
