@@ -161,7 +161,7 @@ class FlowFunctions:
         self._instance.enter_initialization(t_start)
         self._fmu.exitInitializationMode()
         for _ in range(MAX_ITERATIONS):
-            again, terminate, _ = self._instance.update()
+            again, terminate, _ = self._instance.updater()()
             if terminate:
                 raise FlowError("it ends its run at the start")
             if not again:

@@ -87,7 +87,7 @@ class FmuSlave(Slave):
             raise MisfitError(f"{full_name} is a parameter that is not tunable: set it before the run.")
         try:
             held = exact(variable, value, full_name)
-            if self._access is None or name in self.tunable:
+            if self._access is None or (variable.causality == "parameter" and name in self.tunable):
                 require_within(variable, held, full_name)
         except UnfitError as error:
             raise MisfitError(str(error)) from error
@@ -138,6 +138,10 @@ class FmuSlave(Slave):
                 f"{self.name} refuses to be instantiated: {self._calls.said.rstrip('.')}{other}"
             ) from error
         self._access = FmuAccess(instance, self._variables, self._calls)
+        self._enter_event, self._enter_step = map(instance.caller, ("EnterEventMode", "EnterStepMode"))
+        self._iterate = instance.updater()
+        if self.clocks:
+            self._active = instance.ticker(list(self._clock_references.values()))
         self._access.start(
             {STOP_AT_EVENTS: True, **self._starts} if early and self.stops_after_events else self._starts
         )
@@ -150,22 +154,27 @@ class FmuSlave(Slave):
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
-        self._calls(self._instance.call, "EnterEventMode")
+        self._calls(self._enter_event)
 
     def enter_step_mode(self) -> None:
         """See `Slave.enter_step_mode`."""
-        self._calls(self._instance.call, "EnterStepMode")
+        self._calls(self._enter_step)
 
     def update(self) -> Update:
         """See `Slave.update`."""
         ticks = self._ticks()
-        again, terminate, time = self._calls(self._instance.update)
+        again, terminate, time = self._calls(self._iterate)
         return Update(again, ticks, time, self._calls.termination() if terminate else None)
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Slave.step`."""
+        size = t_next - t if self.variable_step else self._size(t_next - t)
+        told = self._calls(self._do_step, t, size)
+        return Step(t_next, False) if told is None else self._carry_on(t, t_next, told)
+
+    def _carry_on(self, t: float, t_next: float, told: Advance | None) -> Step:
+        """Return what a step gave that the FMU has said something of, carried on where it stopped for nothing."""
         for _ in range(MAX_PARTS):
-            told = self._calls(self._do_step, t, t_next - t if self.variable_step else self._size(t_next - t))
             if told is None:
                 return Step(t_next, False)
             # The last successful time is where an FMU is only if it returned early (FMI 3.0.2 section 4.2).
@@ -180,6 +189,7 @@ class FmuSlave(Slave):
                     f"{self.name} returns from a step at {t:.17g} s and gets no further: {self._calls.said}"
                 )
             t = reached
+            told = self._calls(self._do_step, t, t_next - t if self.variable_step else self._size(t_next - t))
         raise CosimError(f"{self.name} returned early from one step {MAX_PARTS} times, the last time at {t:.17g} s.")
 
     def save(self) -> Any:
@@ -228,7 +238,9 @@ class FmuSlave(Slave):
     def _ticks(self) -> tuple[str, ...]:
         if not self.clocks:
             return ()
-        active = self._calls(self._instance.ticks, list(self._clock_references.values()))
+        active = self._calls(self._active)
+        if True not in active:
+            return ()
         return tuple(clock for clock, ticked in zip(self.clocks, active, strict=True) if ticked)
 
     def _size(self, size: float) -> float:

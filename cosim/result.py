@@ -69,8 +69,9 @@ class CosimResult:
         self.times.append(t)
         if not self.signals:
             self.signals.update((name, []) for name in names)
+        signals = self.signals
         for name, value in zip(names, values, strict=True):
-            self.signals[name].append(value)
+            signals[name].append(value)
         if self.watch is not None:
             self.watch(self)
 

@@ -34,7 +34,9 @@ class Connection:
 
     def carried(self, value: Any) -> Any:
         """Return what arrives: the value in the unit of the input."""
-        return self.factor * value + self.offset if self.converts else value
+        if self.factor == 1.0 and self.offset == 0.0:
+            return value
+        return self.factor * value + self.offset
 
     @property
     def converts(self) -> bool:
@@ -136,6 +138,8 @@ class System:
         readers = [slave.reader(list(ports.values())) for slave, ports in outputs.items()]
         places = [k for ports in outputs.values() for k in ports]
         order = sorted(range(len(places)), key=places.__getitem__)
+        if len(readers) == 1:
+            return readers[0]
 
         def read() -> list[Any]:
             values: list[Any] = []

@@ -30,7 +30,8 @@ class FmuAccess:
     def __init__(self, instance: FmuInstance, variables: FmuVariables, calls: FmuCalls) -> None:
         self.instance = instance
         self._variables, self._calls = variables, calls
-        self._getters: dict[str, tuple[Callable[..., list[Any]], tuple[Any, ...], int]] = {}
+        self._getters: dict[str, Callable[[], Any]] = {}
+        self._setters: dict[str, Callable[[Sequence[Any]], None]] = {}
         self._arrays: dict[str, list[Any]] = {}
 
     def start(self, values: Mapping[str, Any]) -> None:
@@ -54,13 +55,25 @@ class FmuAccess:
             If the FMU refuses, or gives a text that is none.
         """
         if name not in self._getters:
-            variable, index = self._variables.places[name]
-            self._getters[name] = *self.instance.getter(variable, self._variables.size(variable)), index
-        getter, arguments, index = self._getters[name]
+            self._getters[name] = self._getter(*self._variables.places[name])
         try:
-            return self._calls(getter, *arguments)[index]
+            return self._getters[name]()
         except (UnicodeDecodeError, AttributeError) as error:
             raise CosimError(f"{self.instance.name}.{name} holds no text in UTF-8, as FMI wants it.") from error
+
+    def _getter(self, variable: Any, index: int) -> Callable[[], Any]:
+        calls, instance, size = self._calls, self.instance, self._variables.size(variable)
+        if instance.in_one_call(variable) is None:
+            getter, arguments = instance.getter(variable, size)
+            return lambda: calls(getter, *arguments)[index]
+        call, values = instance.numbers([variable], [size])
+        bound = [call]
+
+        def read() -> Any:
+            calls(instance.call_all, bound)
+            return values[index]
+
+        return read
 
     def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
         """Return what reads scalars: numbers of one type in one call of the FMU, and all else one by one."""
@@ -101,12 +114,14 @@ class FmuAccess:
     def write(self, name: str, value: Any) -> None:
         """Write a scalar; of an array the others stay as they are."""
         variable, index = self._variables.places[name]
+        if variable.name not in self._setters:
+            self._setters[variable.name] = self.instance.writer(variable, self._variables.size(variable))
         values = [value]
         if variable.dimensions:
             values = self._whole(variable)
             values[index] = value
         try:
-            self._calls(self.instance.set, variable, values)
+            self._calls(self._setters[variable.name], values)
         except CosimError as error:
             raise CosimError(f"{error} It was to set {name!r} to {value!r}.") from error
 

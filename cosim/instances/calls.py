@@ -48,7 +48,8 @@ class FmuCalls:
         CosimError
             If the FMU answers with an error, with the last message of this call, or does not have the function.
         """
-        self._messages.clear()
+        if self._messages:
+            self._messages.clear()
         try:
             return function(*arguments)
         except FMICallException as error:

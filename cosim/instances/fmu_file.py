@@ -130,16 +130,34 @@ class FmuFile:
             If there is no binary for this machine, or it cannot be loaded.
         """
         if self._loaded is None:
-            folder = temporary_folder()
             try:
-                with Archive(self._path) as archive:
-                    unpack(archive, folder)
-                self._loaded = FmuInstance(self.description, folder, self._name, hear, self.kind)
+                unpacked = self._unpacked()
+                self._loaded = FmuInstance(self.description, unpacked.folder, self._name, hear, self.kind)
             except Exception as error:
-                shutil.rmtree(folder, ignore_errors=True)
                 raise CosimError(f"{self._name}: {self._path} cannot be loaded on this machine: {error}") from error
-            weakref.finalize(self, _unload, self._loaded.fmu, folder)
+            weakref.finalize(self, _unload, self._loaded.fmu, unpacked)
         return self._loaded
+
+    def _unpacked(self) -> _Unpacked:
+        """Return the FMU on disk: ours keep nothing outside of instances, so all of one file share one library."""
+        if not self.foresees:
+            return _Unpacked(self._path)
+        told = Path(self._path).stat()
+        key = str(Path(self._path).resolve()), told.st_mtime_ns, told.st_size
+        return _ours.get(key) or _ours.setdefault(key, _Unpacked(self._path))
+
+
+class _Unpacked:
+    """An FMU on disk, for as long as somebody uses it."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.folder = temporary_folder()
+        weakref.finalize(self, shutil.rmtree, self.folder, ignore_errors=True)
+        with Archive(path) as archive:
+            unpack(archive, self.folder)
+
+
+_ours: weakref.WeakValueDictionary[tuple[str, int, int], _Unpacked] = weakref.WeakValueDictionary()
 
 
 def _interfaces(description: Any) -> str:
@@ -160,6 +178,6 @@ def _seconds(text: str | None) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _unload(fmu: Any, folder: Path) -> None:
+def _unload(fmu: Any, unpacked: _Unpacked) -> None:
     fmu.freeLibrary()
-    shutil.rmtree(folder, ignore_errors=True)
+    del unpacked  # the file is there until its library is not

@@ -86,16 +86,19 @@ def run_fixed_step(
         start_slaves(system, t_start, t_stop, events=False, changes=changes)
         points = _Points(system, record)
         result.keep(t_start, record, points.read())
+        hand_on = order == "gauss-seidel"
         # Time by index: adding up steps would drift (rule 9).
         for k in range(1, count + 1):
-            if not _step_all(system, result, t_stop if k == count else t_start + k * step, order == "gauss-seidel"):
+            t_next = t_stop if k == count else t_start + k * step
+            if not _step_all(system, result, t_next, hand_on):
                 sample_end(system, result, result.t, record)
                 break
             recorded = points.read()
             if k % every == 0 or k == count:
-                result.keep(result.t, record, recorded)
+                result.keep(t_next, record, recorded)
             points.exchange()
-            changes.arrive(result.t)
+            if inputs:
+                changes.arrive(t_next)
         result.final = outputs(system)
     finally:
         system.close()
@@ -103,11 +106,12 @@ def run_fixed_step(
 
 
 def _step_all(system: System, result: CosimResult, t_next: float, hand_on: bool) -> bool:
+    t = result.t
     for name, slave in system.slaves.items():
-        made = slave.step(result.t, t_next)
+        _, _, terminated = made = slave.step(t, t_next)
         result.steps += 1
-        if made.terminated:
-            result.terminate(name, made.reached, made.terminated)
+        if terminated:
+            result.terminate(name, made.reached, terminated)
             return False
         if hand_on:
             for wire in system.from_slave(name):
@@ -131,6 +135,8 @@ class _Points:
     def read(self) -> list[Any]:
         """Read everything before anything is written, for the order of slaves must not matter; return the recorded."""
         values = self._read()
+        if not self._inputs:
+            return values
         self._values = values[self._recorded :]
         return values[: self._recorded]
 
@@ -139,7 +145,7 @@ class _Points:
         values = self._values
         for k, carried in self._converted:
             values[k] = carried(values[k])
-        if values == self._sent:
+        if values == self._sent:  # as in a system without connections
             return
         for (slave, name), value, before in zip(self._inputs, values, self._sent, strict=True):
             if value != before:

@@ -151,9 +151,7 @@ class FmuInstance:
         name = f"fmi{self.major}Get{accessor(kind, self.major)}"
         references = (c.c_uint32 * len(variables))(*(variable.valueReference for variable in variables))
         values = (C_TYPES[self.major][kind] * sum(sizes))()
-        length = () if self.major == 2 else (c.c_size_t(len(values)),)
-        call = self._bound(name, c.byref(references), c.c_size_t(len(variables)), c.byref(values), *length)
-        return (name, call), values
+        return (name, self._on_values(name, references, values)), values
 
     @staticmethod
     def call_all(calls: Sequence[BoundCall]) -> None:
@@ -162,6 +160,38 @@ class FmuInstance:
             status = call()
             if status > fmi1Warning:
                 raise FMICallException(function=name, status=status)
+
+    def writer(self, variable: Any, size: int) -> Callable[[Sequence[Any]], None]:
+        """Return what writes all elements of a variable, one that `in_one_call` names in a call that is made once."""
+        if self.in_one_call(variable) is None:
+            return functools.partial(self.set, variable)
+        name = f"fmi{self.major}Set{accessor(variable.type, self.major)}"
+        buffer = (C_TYPES[self.major][variable.type] * size)()
+        call = self._on_values(name, (c.c_uint32 * 1)(variable.valueReference), buffer)
+
+        def write(values: Sequence[Any]) -> None:
+            buffer[:] = values
+            if (status := call()) > fmi1Warning:
+                raise FMICallException(function=name, status=status)
+
+        return write
+
+    def _on_values(self, name: str, references: Any, values: Any) -> Callable[[], int]:
+        length = () if self.major == 2 else (c.c_size_t(len(values)),)
+        return self._bound(name, c.byref(references), c.c_size_t(len(references)), c.byref(values), *length)
+
+    def caller(self, name: str) -> Callable[[], Any]:
+        """Return what calls a function that takes nothing but the instance, for as long as that lives."""
+        if self.major == 2:
+            return functools.partial(self.call, name)
+        full_name = f"fmi3{name}"
+        call = self._bound(full_name)
+
+        def run() -> None:
+            if (status := call()) > fmi1Warning:
+                raise FMICallException(function=full_name, status=status)
+
+        return run
 
     def _bound(self, name: str, *arguments: Any) -> Callable[[], int]:
         """Return what calls a function with arguments that are C data already.
@@ -185,9 +215,16 @@ class FmuInstance:
         It gives None if the FMU came to the end of the step and tells nothing more. An FMU of FMI 2.0 may end a step
         early, with fmi2Discard.
         """
-        if self.major == 2:
-            return self._step_of_fmi2
         time, length = c.c_double(), c.c_double()
+        if self.major == 2:
+            do_step = self._bound("fmi2DoStep", time, length, c.c_int(1))
+
+            def step_of_fmi2(t: float, size: float) -> Advance | None:
+                time.value, length.value = t, size
+                status = do_step()
+                return self._discarded(t, status) if status else None
+
+            return step_of_fmi2
         event, terminate, early, reached = c.c_bool(), c.c_bool(), c.c_bool(), c.c_double()
         answers = c.byref(event), c.byref(terminate), c.byref(early), c.byref(reached)
         call = self._bound("fmi3DoStep", time, length, c.c_bool(True), *answers)
@@ -203,15 +240,13 @@ class FmuInstance:
 
         return step
 
-    def _step_of_fmi2(self, t: float, size: float) -> Advance | None:
-        try:
-            self.fmu.doStep(t, size)
-        except FMICallException as error:
-            if error.status != fmi2Discard:
-                raise
-            ended = self._status(self.fmu.getBooleanStatus, fmi2Terminated, False)
-            return Advance(self._status(self.fmu.getRealStatus, fmi2LastSuccessfulTime, t), False, ended, True)
-        return None
+    def _discarded(self, t: float, status: int) -> Advance | None:
+        if status != fmi2Discard:
+            if status > fmi1Warning:
+                raise FMICallException(function="fmi2DoStep", status=status)
+            return None
+        ended = self._status(self.fmu.getBooleanStatus, fmi2Terminated, False)
+        return Advance(self._status(self.fmu.getRealStatus, fmi2LastSuccessfulTime, t), False, ended, True)
 
     @staticmethod
     def _status(ask: Callable[[int], Any], kind: int, otherwise: Any) -> Any:
@@ -221,14 +256,40 @@ class FmuInstance:
         except FMICallException:
             return otherwise
 
-    def update(self) -> tuple[bool, bool, float | None]:
-        """Do one event iteration; return whether it needs one more, whether it ends the run, the next event's time."""
+    def updater(self) -> Callable[[], tuple[bool, bool, float | None]]:
+        """Return what does one event iteration, for as long as the instance lives.
+
+        It gives whether it needs one more, whether it ends the run, and the next event's time.
+        """
+        if self.major == 2:
+            return self._update_of_fmi2
+        flags, time = [c.c_bool() for _ in range(5)], c.c_double()
+        again, terminate, _, _, defined = flags
+        call = self._bound("fmi3UpdateDiscreteStates", *map(c.byref, flags), c.byref(time))
+
+        def update() -> tuple[bool, bool, float | None]:
+            if (status := call()) > fmi1Warning:
+                raise FMICallException(function="fmi3UpdateDiscreteStates", status=status)
+            return again.value, terminate.value, time.value if defined.value else None
+
+        return update
+
+    def _update_of_fmi2(self) -> tuple[bool, bool, float | None]:
         again, terminate, _, _, defined, time = self.call("UpdateDiscreteStates")
         return again, terminate, time if defined else None
 
-    def ticks(self, references: Sequence[int]) -> list[bool]:
-        """Return which clocks tick."""
-        return list(self.call("GetClock", references))
+    def ticker(self, references: Sequence[int]) -> Callable[[], list[bool]]:
+        """Return what gives which clocks tick, for as long as the instance lives."""
+        count = len(references)
+        active = (c.c_bool * count)()
+        call = self._bound("fmi3GetClock", (c.c_uint32 * count)(*references), c.c_size_t(count), active)
+
+        def ticks() -> list[bool]:
+            if (status := call()) > fmi1Warning:
+                raise FMICallException(function="fmi3GetClock", status=status)
+            return active[:]
+
+        return ticks
 
     def slopes(self, unknowns: Sequence[int], known: int, seed: Sequence[float], size: int) -> list[float]:
         """Return the directional derivatives, `size` in all, of variables by one variable along a seed."""

@@ -26,8 +26,7 @@ class Termination:
     failed: bool = True
 
 
-@dataclass(frozen=True)
-class Update:
+class Update(NamedTuple):
     """What one event iteration of a block gave.
 
     Attributes

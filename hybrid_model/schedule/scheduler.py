@@ -15,7 +15,7 @@ import heapq
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from hybrid_model.errors import SchedulingError
 from hybrid_model.scales import one_instant
@@ -44,8 +44,7 @@ class Wire(Protocol):
         """Return what arrives of a value that leaves."""
 
 
-@dataclass(frozen=True)
-class Tick:
+class Tick(NamedTuple):
     """A tick of an output clock: `slave`'s `clock` at `t` in s."""
 
     t: float
@@ -53,8 +52,7 @@ class Tick:
     clock: str
 
 
-@dataclass(frozen=True)
-class Event:
+class Event(NamedTuple):
     """An event of a block, at `t` in s."""
 
     t: float
@@ -163,7 +161,7 @@ class Scheduler:
         iterations: dict[str, int] = {}
         self.t = t
         while pending and not self.ended:
-            name = min(pending, key=lambda n: self._places[n].order)
+            name = self._in_order(pending)[0]
             iterations[name] = iterations.get(name, 0) + 1
             if iterations[name] > ITERATIONS:
                 raise SchedulingError(f"{name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s.")
@@ -208,14 +206,18 @@ class Scheduler:
         return due | {place.block.name for place in stopped}
 
     def _in_order(self, names: Iterable[str]) -> list[str]:
-        return sorted(names, key=lambda name: self._places[name].order)
+        some = list(names)
+        return sorted(some, key=lambda name: self._places[name].order) if len(some) > 1 else some
 
     def _send(self, name: str, t: float, touched: set[str]) -> set[str]:
         """Carry the outputs of a block to their receivers; return those for whom something changed."""
         receivers: set[str] = set()
         sender = self._places[name].block
+        read: dict[str, Any] = {}
         for wire in self._wires_from(name):
-            value = wire.carried(sender.get(wire.output))
+            if wire.output not in read:
+                read[wire.output] = sender.get(wire.output)
+            value = wire.carried(read[wire.output])
             place, at = self._places[wire.target], (wire.target, wire.input)
             # An input is read once: what it holds later is what was sent to it.
             if at not in self._arrived:
@@ -238,7 +240,7 @@ class Scheduler:
         place.block.enter_event_mode()
 
     def _require_behind(self, place: _Place, t: float, sender: str) -> None:
-        if place.t > t + self._instant(place, t):
+        if place.t > t and place.t > t + self._instant(place, t):
             raise SchedulingError(
                 f"{sender} sends to {place.block.name} at t = {t:.12g} s, but {place.block.name} is at "
                 f"{place.t:.12g} s already and cannot return to an earlier state: use the fixed-step master."
@@ -246,7 +248,7 @@ class Scheduler:
 
     def _require_announced(self, place: _Place, t: float) -> None:
         """Refuse a stop before `t`; at the same instant, it is rounding."""
-        if place.t < t - self._instant(place, t) and not self.ended:
+        if place.t < t and place.t < t - self._instant(place, t) and not self.ended:
             raise SchedulingError(
                 f"{place.block.name} stopped at t = {place.t:.12g} s for an event that it had not announced, on the "
                 f"way to {t:.12g} s: its nextEventTime is wrong."
@@ -255,7 +257,7 @@ class Scheduler:
     def _step(self, place: _Place, t: float) -> Step:
         made = place.block.step(place.t, t)
         self.steps += 1
-        if made.reached < place.t or made.reached > t + self._instant(place, t):
+        if made.reached < place.t or (made.reached > t and made.reached > t + self._instant(place, t)):
             raise SchedulingError(
                 f"{place.block.name} stepped from {place.t:.12g} towards {t:.12g} s and says that it is at "
                 f"{made.reached:.12g} s: that is outside the step."
@@ -300,7 +302,7 @@ class Scheduler:
             first = min(place.t for place in stopped)
         due = {place.block.name for place in stopped}
         instant = first
-        while self._queue and self._queue[0][0] <= min(first + self._instant(self._first_place(), first), limit):
+        while self._queue and self._queue[0][0] <= limit and self._is_at(first):
             time, _, _, name = heapq.heappop(self._queue)
             instant = max(instant, time)
             due.add(name)
@@ -312,8 +314,10 @@ class Scheduler:
                 self._step(place, instant)
         return instant, set() if self.ended else due
 
-    def _first_place(self) -> _Place:
-        return self._places[self._queue[0][3]]
+    def _is_at(self, t: float) -> bool:
+        """Return whether the first prediction is of the instant `t` in s."""
+        time, _, _, name = self._queue[0]
+        return time <= t or time <= t + self._instant(self._places[name], t)
 
     def _instant(self, place: _Place, t: float) -> float:
         """Return in s how far a block's event may be from `t` and still be of that instant (rule 6)."""
@@ -331,6 +335,8 @@ class Scheduler:
         Each is stepped to the first stop of those before it. Those that are beyond the last one's return there; what
         cannot return stays ahead, for as long as nobody sends anything to it.
         """
+        if not self._unpredictable:
+            return []
         watched = [self._places[name] for name in self._unpredictable if self._places[name].t < horizon]
         watched.sort(key=lambda place: (not place.block.can_restore, place.order))
         # Nobody can be behind the one that is stepped last.

@@ -77,5 +77,5 @@ def test_errors_arrive_as_they_are(stranger, tmp_path):
     with pytest.raises(MisfitError, match=r"it.int8_in is set to 200, but it is an Int8"):
         slave.set("int8_in", 200)
     slave.close()
-    with pytest.raises(CosimError, match="cannot be read as an FMU"):
+    with pytest.raises(CosimError, match="there is no file"):
         IsolatedSlave("it", tmp_path / "none.fmu")
