@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 # Threads cost more than they give on matrices of some ten rows.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: run test test-long faults benchmark docs lint format clean
+.PHONY: run test test-long faults benchmark docs notebooks lint format clean
 
 run: $(READY)
 	$(BIN)/hybrid-fmu paper --out results
@@ -35,6 +35,10 @@ benchmark: $(READY)
 # The site, readable without a network: build/site/index.html.
 docs: $(READY)
 	$(BIN)/sphinx-build -W --keep-going -q docs build/site
+
+# Runs the scripts in notebooks/ and keeps what they show in the files beside them.
+notebooks: $(READY)
+	$(BIN)/python tests/support/notebook_run.py
 
 lint: $(READY)
 	$(BIN)/ruff format --check .
