@@ -10,8 +10,9 @@
 
 #include "fmi3Functions.h"
 
-enum { WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS, HANGS, ABORTS, ITERATES };
-enum { X = 1, COUNT, RATE, ENDS, BEHAVIOUR, ANNOUNCES, SIZE, WEIGHTS, TOTAL, STEPS, SENT, HEARD, GAIN, GAINED,
+enum { WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS, HANGS, ABORTS, ITERATES,
+       PASTS, BEYOND, BACKWARD, THRICE };
+enum { X = 1, COUNT, RATE, ENDS, BEHAVIOUR, ANNOUNCES, SIZE, WEIGHTS, TOTAL, STEPS, SENT, HEARD, GAIN, GAINED, PULSE,
        FIRST_ECHO = 20, ECHOES = 40 };
 enum { MOST = 100 };
 
@@ -23,11 +24,14 @@ typedef struct {
     int64_t wholes[ECHOES];
     uint64_t naturals[ECHOES], size;
     int32_t count, ends, behaviour, steps;
-    int announces, events, stateless, rigid, configuring, initializing, frozen;
+    int updates, announces, events, stateless, rigid, configuring, initializing, frozen;
     char text[100];
     unsigned char bytes[100];
     size_t length;
 } Block;
+
+/* States that are saved and not freed, of all instances. */
+int stranger_held;
 
 static fmi3Status refuse(Block *b, const char *format, double number)
 {
@@ -103,10 +107,20 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance i, fmi3Boolean *again, fmi3Bool
     if (b->next >= due(b) - 1e-9)
         jump(b);
     *nominals = *values = 0;
-    *again = b->behaviour == ITERATES;
+    b->updates++;
+    *again = b->behaviour == ITERATES || (b->behaviour == THRICE && b->updates % 3 != 0);
     *terminate = b->count >= b->ends;
-    *defined = b->announces;
-    *time = due(b);
+    *defined = b->announces || b->behaviour == PASTS;
+    *time = b->behaviour == PASTS ? b->next - 1.0 : due(b);
+    return fmi3OK;
+}
+
+/* The clock ticks in the second of three iterations alone. */
+fmi3Status fmi3GetClock(fmi3Instance i, const fmi3ValueReference r[], size_t n, fmi3Clock v[])
+{
+    Block *b = i;
+    for (size_t j = 0; j < n; j++)
+        v[j] = r[j] == PULSE && b->behaviour == THRICE && b->count > 0 && b->updates % 3 == 1;
     return fmi3OK;
 }
 
@@ -139,6 +153,11 @@ fmi3Status fmi3DoStep(fmi3Instance i, fmi3Float64 point, fmi3Float64 size, fmi3B
         *early = 1;
         *event = b->behaviour == REPEATS;
         *time = b->next = b->behaviour == CREEPS ? nextafter(point, INFINITY) : point;
+        return fmi3OK;
+    }
+    if ((b->behaviour == BEYOND || b->behaviour == BACKWARD) && point > 0.45) {
+        *event = *early = 1;
+        *time = b->next = b->behaviour == BEYOND ? target + 1.0 : point - 0.2;
         return fmi3OK;
     }
     if (b->behaviour == PANTS && size > 0.03) {
@@ -332,8 +351,10 @@ fmi3Status fmi3GetFMUState(fmi3Instance i, fmi3FMUState *state)
 {
     if (((Block *)i)->stateless)
         return refuse(i, "no state can be had", 0.0);
-    if (!*state)
+    if (!*state) {
         *state = malloc(sizeof(Block));
+        stranger_held++;
+    }
     memcpy(*state, i, sizeof(Block));
     return fmi3OK;
 }
@@ -341,6 +362,7 @@ fmi3Status fmi3SetFMUState(fmi3Instance i, fmi3FMUState state) { memcpy(i, state
 fmi3Status fmi3FreeFMUState(fmi3Instance i, fmi3FMUState *state)
 {
     (void)i;
+    stranger_held -= *state != NULL;
     free(*state);
     *state = NULL;
     return fmi3OK;

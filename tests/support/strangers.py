@@ -4,7 +4,7 @@ import zipfile
 
 import fmpy
 
-WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS, HANGS, ABORTS, ITERATES = range(10)
+WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS, HANGS, ABORTS, ITERATES, PASTS, BEYOND, BACKWARD, THRICE = range(14)
 """Behaviours of `stranger3.c`."""
 TYPES = {
     "Float64": 'min="-0.1" max="1e6"',
@@ -44,11 +44,13 @@ _DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
     <Int32 name="sent" valueReference="11" causality="output" variability="discrete"/>
     <Float64 name="heard" valueReference="12" causality="input" variability="discrete" start="0"/>
     <Float64 name="stranger.h" valueReference="13" causality="parameter" variability="fixed" start="1"/>
+{pulse}
 {echoes}
   </ModelVariables>
   <ModelStructure><Output valueReference="1"/><Output valueReference="2"/></ModelStructure>
 </fmiModelDescription>
 """
+_PULSE = '    <Clock name="pulse" valueReference="15" causality="output" intervalVariability="triggered"/>'
 _ECHO = '<{type} name="{name}" valueReference="{reference}" causality="{causality}" variability="discrete" {more}'
 
 
@@ -72,9 +74,18 @@ def _echoes():
 
 
 def write_stranger3(
-    path, binary, *, events=True, states=True, variable=True, alone=False, experiment='stopTime="2"', kind=None
+    path,
+    binary,
+    *,
+    events=True,
+    states=True,
+    variable=True,
+    alone=False,
+    experiment='stopTime="2"',
+    kind=None,
+    pulse=False,
 ):
-    """Write an FMU of FMI 3.0: its flags, its default experiment, and another interface than Co-Simulation."""
+    """Write an FMU of FMI 3.0: flags, default experiment, another interface than Co-Simulation, a clock."""
     flags = {"hasEventMode": events, "canGetAndSetFMUState": states, "canHandleVariableCommunicationStepSize": variable}
     flags["canBeInstantiatedOnlyOncePerProcess"] = alone
     content = _DESCRIPTION.format(
@@ -82,6 +93,7 @@ def write_stranger3(
         kind=kind or "CoSimulation",
         flags=" ".join(f'{name}="true"' for name, given in flags.items() if given) if kind is None else "",
         experiment=experiment,
+        pulse=_PULSE if pulse else "",
         echoes="\n".join(f"    {line}" for line in _echoes()),
     )
     with zipfile.ZipFile(path, "w") as archive:
