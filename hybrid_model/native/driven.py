@@ -50,8 +50,8 @@ class Driven:
         """Number of inputs that the model has behind those of the automaton."""
         return _extra(self.pieced)
 
-    def coefficients(self, a: float, b: float) -> FloatArray:
-        """Return what the extra inputs are on a piece from `a` to `b`, in s.
+    def coefficients(self, a: float, b: float, *, closed: bool) -> FloatArray:
+        """Return what the extra inputs are on a piece from `a` to `b`, in s, its end included if it is `closed`.
 
         Raises
         ------
@@ -62,7 +62,9 @@ class Driven:
         """
         if not self.pieced:
             return np.zeros(0)
-        rows = [_fitted(place, signal, a, b) for place, signal in self.pieced]
+        # At the end the signal is the next piece's already, if there is one.
+        last = b if closed else float(np.nextafter(b, a))
+        rows = [_fitted(place, signal, a, b, last) for place, signal in self.pieced]
         return np.concatenate([[0.5 * (a + b), 0.5 * (b - a) or 1.0], *(row.ravel() for row in rows)])
 
 
@@ -131,15 +133,14 @@ def _clenshaw(columns: Sequence[Any], part: Any) -> Any:
     return columns[0] + part * one - two
 
 
-def _fitted(place: Place, signal: Callable[[float], npt.ArrayLike], a: float, b: float) -> FloatArray:
-    """Return the coefficients of a signal on a piece, shape (size, DEGREE + 1)."""
+def _fitted(place: Place, signal: Callable[[float], npt.ArrayLike], a: float, b: float, last: float) -> FloatArray:
+    """Return the coefficients of a signal on a piece, shape (size, DEGREE + 1), asked up to the time `last`."""
     size = place.variable.size
 
     def values(parts: FloatArray) -> FloatArray:
-        times = np.clip(0.5 * (a + b) + 0.5 * (b - a) * parts, a, np.nextafter(b, a))
+        times = np.clip(0.5 * (a + b) + 0.5 * (b - a) * parts, a, last)
         return np.array([np.broadcast_to(sampled_signal(place.variable, signal, float(t)), size) for t in times])
 
-    # Not the end, where the signal is the next piece's already.
     nodes = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
     basis = np.cos(np.outer(np.arange(DEGREE + 1), np.arccos(nodes)))
     apart = np.linspace(-1.0, 1.0, _SEED_POINTS)

@@ -108,12 +108,12 @@ class _Driver:
         """Run from the start of a span to its end; return whether the run is over before."""
         inputs, (start, end) = self._inputs, span
         breakpoints = inputs.breakpoints_in(start, end)
-        u, p = self._outside(start, breakpoints[0] if breakpoints else end)
+        u, p = self._outside(start, breakpoints, end)
         over = not self._run.start([inputs.start(Kind.STATE), inputs.start(Kind.DISCRETE), u, p], start, end, record)
         for k, time in enumerate(breakpoints):
             if over or self._goes_on_to(time, take=False):
                 return True
-            self._change(*self._outside(time, [*breakpoints[k + 1 :], end][0]))
+            self._change(*self._outside(time, breakpoints[k + 1 :], end))
         return over or self._goes_on_to(end, take=True)
 
     def _goes_on_to(self, time: float, *, take: bool) -> bool:
@@ -123,9 +123,11 @@ class _Driver:
             advance = self._run.advance(time, take=take)
         return advance in (Advance.ENDED, Advance.PAUSED)
 
-    def _outside(self, a: float, b: float) -> tuple[FloatArray, FloatArray]:
-        """Return inputs and parameters on the piece from `a` to `b`, in s."""
-        extra = np.zeros(0) if self._driven is None else self._driven.coefficients(a, b)
+    def _outside(self, a: float, later: list[float], end: float) -> tuple[FloatArray, FloatArray]:
+        """Return inputs and parameters on the piece from `a` to the first of the later breakpoints, or to the end."""
+        extra = np.zeros(0)
+        if self._driven is not None:
+            extra = self._driven.coefficients(a, later[0] if later else end, closed=not later)
         return np.concatenate([self._inputs.held, extra]), self._inputs.parameters_at(a)
 
     def _change(self, u: FloatArray, p: FloatArray) -> None:

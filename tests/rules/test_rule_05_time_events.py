@@ -119,3 +119,30 @@ def test_every_method_stops_at_events_and_goes_on(method):
     arc = hm.simulate(SquareWave(), 1.0, solver=hm.Solver(method=method, rtol=1e-9, atol=1e-10))
     assert [jump.t for jump in arc.jumps] == [k * 0.3 for k in range(1, 4)]
     assert arc.end.x == pytest.approx(0.2, abs=1e-8)
+
+
+class Alarm(hm.HybridAutomaton):
+    """Rings once when its input is up."""
+
+    x = hm.State(0.0)
+    u = hm.Input(0.0)
+    rung = hm.DiscreteState(0, integer=True)
+
+    def flow_map(self, s):
+        return {"x": s.u}
+
+    def jump_set(self, s):
+        return hm.least(s.u - 0.5, 0.5 - s.rung)
+
+    def jump_map(self, s):
+        return {"rung": s.rung + 1}
+
+
+@pytest.mark.parametrize("breakpoints", [[0.25], [0.25, 1.0]], ids=["not told", "told"])
+@pytest.mark.parametrize("late", [0.0, 1e-9])
+def test_an_input_that_jumps_at_the_end_of_the_run_has_its_new_value_there(breakpoints, late):
+    """Whether or not it is told: at the end an input is what its function says."""
+    signal = hm.Signal(lambda t: 1.0 if t >= 1.0 + late else 0.0, breakpoints)
+    arc = hm.simulate(Alarm(), 1.0, inputs={"u": signal})
+    assert [jump.t for jump in arc.jumps] == ([] if late else [1.0])
+    assert arc.at("x", 1.0) == 0.0
