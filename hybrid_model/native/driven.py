@@ -7,6 +7,7 @@ breakpoint. What is neither runs in Python.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,7 +21,7 @@ from hybrid_model.declare.signals import Inputs, sampled_signal
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.errors import TraceError
 from hybrid_model.native.symbols import expressions, symbols
-from hybrid_model.native.trace import Trace
+from hybrid_model.native.trace import ARGUMENTS, Trace
 
 DEGREE = 8
 """Of the polynomials."""
@@ -32,18 +33,43 @@ _HELD = 64.0
 
 @dataclass(frozen=True)
 class Driven:
-    """A traced automaton with inputs that follow functions of time.
+    """Inputs that follow functions of time.
 
     Attributes
     ----------
-    trace : Trace
-        Its maps, whose input vector has the coefficients behind the inputs.
+    followed : casadi.Function
+        Of time, the input vector and the coefficients behind it: the input vector that the maps get.
     pieced : tuple of (Place, callable)
         The inputs that are polynomials, in the order of their coefficients.
     """
 
-    trace: Trace
+    followed: ca.Function
     pieced: tuple[tuple[Place, Callable[[float], npt.ArrayLike]], ...]
+
+    @functools.cached_property
+    def key(self) -> bytes:
+        """The same for all that make one model of one automaton."""
+        return str(self.followed.serialize()).encode()
+
+    def driving(self, traced: Trace) -> Trace:
+        """Return the maps of an automaton whose inputs these are, with the coefficients behind its input vector."""
+
+        def function(given: ca.Function) -> ca.Function:
+            t, x, z, u, p = (ca.SX.sym(name, given.size1_in(k)) for k, name in enumerate(ARGUMENTS))
+            extra = ca.SX.sym("coefficients", self.extra)
+            followed = self.followed(t, u, extra)
+            return ca.Function(given.name(), [t, x, z, ca.vertcat(u, extra), p], given.call([t, x, z, followed, p]))
+
+        return replace(
+            traced,
+            start=function(traced.start),
+            flow=function(traced.flow),
+            flow_set=function(traced.flow_set),
+            margins=function(traced.margins),
+            times=function(traced.times),
+            outputs=function(traced.outputs),
+            resets=tuple(map(function, traced.resets)),
+        )
 
     @property
     def extra(self) -> int:
@@ -68,15 +94,15 @@ class Driven:
         return np.concatenate([[0.5 * (a + b), 0.5 * (b - a) or 1.0], *(row.ravel() for row in rows)])
 
 
-def drive(traced: Trace, inputs: Inputs) -> Driven:
-    """Let inputs of traced maps follow functions of time.
+def drive(inputs: Inputs) -> Driven:
+    """Return inputs that follow functions of time.
 
     Raises
     ------
     TraceError
         If a function without breakpoints cannot be traced.
     """
-    t, u = ca.SX.sym("t"), ca.SX.sym("u", traced.flow.size1_in(3))
+    t, u = ca.SX.sym("t"), ca.SX.sym("u", len(inputs.held))
     elements = ca.vertsplit(u)
     pieced = []
     for place, signal, breakpoints in inputs.signals:
@@ -91,23 +117,7 @@ def drive(traced: Trace, inputs: Inputs) -> Driven:
         columns = [coefficients[first + k : last : DEGREE + 1] for k in range(DEGREE + 1)]
         elements[place.at] = ca.vertsplit(_clenshaw(columns, (t - coefficients[0]) / coefficients[1]))
         first = last
-    followed = ca.vertcat(*elements)
-
-    def function(given: ca.Function) -> ca.Function:
-        x, z, p = (ca.SX.sym(name, given.size1_in(k)) for name, k in (("x", 1), ("z", 2), ("p", 4)))
-        return ca.Function(given.name(), [t, x, z, ca.vertcat(u, coefficients), p], given.call([t, x, z, followed, p]))
-
-    driven = replace(
-        traced,
-        start=function(traced.start),
-        flow=function(traced.flow),
-        flow_set=function(traced.flow_set),
-        margins=function(traced.margins),
-        times=function(traced.times),
-        outputs=function(traced.outputs),
-        resets=tuple(map(function, traced.resets)),
-    )
-    return Driven(driven, tuple(pieced))
+    return Driven(ca.Function("followed", [t, u, coefficients], [ca.vertcat(*elements)]), tuple(pieced))
 
 
 def _extra(pieced: Sequence[tuple[Place, Any]]) -> int:

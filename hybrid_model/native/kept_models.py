@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.errors import DeclarationError, TraceError
+from hybrid_model.native.driven import Driven
 from hybrid_model.native.free_values.snapshots import Snapshot, current, why_untold
 from hybrid_model.native.model_code import run_code
 from hybrid_model.native.networks.network import NetworkTrace, trace_any
@@ -22,12 +23,17 @@ from hybrid_model.native.trace import Trace
 MOST_MODELS = 256
 """So many are kept, those that were used last."""
 
-_of_snapshots: weakref.WeakKeyDictionary[Snapshot, NativeModel] = weakref.WeakKeyDictionary()
+MOST_DRIVEN = 16
+"""With so many functions of time as inputs, one automaton has models that are kept."""
+
+_of_snapshots: weakref.WeakKeyDictionary[Snapshot, dict[bytes, NativeModel]] = weakref.WeakKeyDictionary()
 _by_key: OrderedDict[bytes, NativeModel] = OrderedDict()
 _lock = threading.Lock()
 
 
-def model_of(automaton: Automaton, check: Callable[[], None], *, stiff: bool = False) -> NativeModel:
+def model_of(
+    automaton: Automaton, check: Callable[[], None], *, stiff: bool = False, driven: Driven | None = None
+) -> NativeModel:
     """Return the compiled model of an automaton.
 
     Parameters
@@ -39,25 +45,32 @@ def model_of(automaton: Automaton, check: Callable[[], None], *, stiff: bool = F
     stiff : bool
         Whether the model must have what a method for stiff flows needs; one that has it is kept in place of one that
         has not.
+    driven : Driven, optional
+        Its inputs, where they follow functions of time.
 
     Raises
     ------
     TraceError
-        If its maps cannot be traced.
+        If its maps cannot be traced, or those of a large network are to follow functions of time.
     BuildError
         If there is no compiler, or it fails.
     """
-    taken = current(automaton)
-    known = None if taken is None else _of_snapshots.get(taken)
+    taken, inputs = current(automaton), b"" if driven is None else driven.key
+    known = None if taken is None else _of_snapshots.get(taken, {}).get(inputs)
     if known is not None and known.stiff >= stiff:
         return known
     check()
-    model = None if taken is None else _recent(taken.key)
+    model = None if taken is None else _recent(taken.key + inputs)
     if model is None or model.stiff < stiff:
-        model = made_model(automaton, traced_maps(automaton), stiff=stiff)
+        traced = traced_maps(automaton)
+        if driven is not None:
+            if isinstance(traced, NetworkTrace):
+                raise TraceError("inputs of a large network follow functions of time in Python only.")
+            traced = driven.driving(traced)
+        model = made_model(automaton, traced, stiff=stiff)
     # Maps that change what they read by being called are traced again each time.
     if taken is not None and taken.still_holds():
-        _keep(taken, model)
+        _keep(taken, inputs, model)
     return model
 
 
@@ -66,7 +79,7 @@ def what_ran(automaton: Automaton) -> str:
     taken = current(automaton)
     if taken is None:
         return f"native: its maps are compiled, and traced anew for each run: {why_untold(automaton)}."
-    if _of_snapshots.get(taken) is None:
+    if taken not in _of_snapshots:
         return "native: its maps are compiled, and traced anew for each run: they change what they read."
     return "native: its maps are compiled."
 
@@ -111,9 +124,12 @@ def _recent(key: bytes) -> NativeModel | None:
         return _by_key.get(key)
 
 
-def _keep(taken: Snapshot, model: NativeModel) -> None:
+def _keep(taken: Snapshot, inputs: bytes, model: NativeModel) -> None:
     with _lock:
-        _of_snapshots[taken] = model
-        _by_key[taken.key] = model
+        models = _of_snapshots.setdefault(taken, {})
+        if len(models) >= MOST_DRIVEN:
+            models.clear()
+        models[inputs] = model
+        _by_key[taken.key + inputs] = model
         while len(_by_key) > MOST_MODELS:
             _by_key.popitem(last=False)

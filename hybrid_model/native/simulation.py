@@ -11,9 +11,8 @@ from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import SimulationError, TraceError
 from hybrid_model.native.driven import Driven, drive
-from hybrid_model.native.kept_models import made_model, model_of, traced_maps, what_ran
-from hybrid_model.native.networks.network import NetworkTrace
-from hybrid_model.native.run import Advance, Ending, NativeModel, NativeRun, Options, Record
+from hybrid_model.native.kept_models import model_of, what_ran
+from hybrid_model.native.run import Advance, Ending, NativeRun, Options, Record
 from hybrid_model.record.arc_values import ComputedValues
 from hybrid_model.record.row_flows import RowFlows, RowJumps
 from hybrid_model.record.run_record import RunRecord
@@ -67,10 +66,8 @@ def native_run(
     require_supported(solver)
     record, stiff = Record.JUMPS if events_only else Record.ALL, solver.method in FOR_STIFF_FLOWS
     for again in (False, True):
-        if inputs.vary:
-            model, driven = _driven_model(automaton, inputs, check, stiff=stiff)
-        else:
-            model, driven = model_of(automaton, check, stiff=stiff), None
+        driven = drive(inputs) if inputs.vary else None
+        model = model_of(automaton, check, stiff=stiff, driven=driven)
         run = NativeRun(model)
         set_options(run, solver, zeno, inputs.layout.sizes[Kind.STATE])
         ended = _Driver(run, inputs, driven).run(span, record)
@@ -134,17 +131,6 @@ class _Driver:
         for kind, values in ((Kind.INPUT, u), (Kind.PARAMETER, p)):
             for index, value in enumerate(values):
                 self._run.set(kind, index, float(value))
-
-
-def _driven_model(
-    automaton: Automaton, inputs: Inputs, check: Callable[[], None], *, stiff: bool
-) -> tuple[NativeModel, Driven]:
-    check()
-    traced = traced_maps(automaton)
-    if isinstance(traced, NetworkTrace):
-        raise TraceError("inputs of a large network follow functions of time in Python only.")
-    driven = drive(traced, inputs)
-    return made_model(automaton, driven.trace, stiff=stiff), driven
 
 
 def require_supported(solver: Solver) -> None:

@@ -10,6 +10,7 @@ import os
 import select
 import struct
 import subprocess
+import time
 from pathlib import Path
 
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files, runtime_sources
@@ -123,12 +124,14 @@ class Harness:
         In addition to this process's.
     time_limit : float
         For one answer, in s.
+    whole : float
+        For all of them, in s.
     """
 
-    def __init__(self, program, variables, before=(), environment=None, time_limit=TIME_LIMIT):
+    def __init__(self, program, variables, before=(), environment=None, time_limit=TIME_LIMIT, whole=math.inf):
         self.variables = variables
         self.places = {variable.name: k for k, variable in enumerate(variables)}
-        self.time_limit = time_limit
+        self.time_limit, self.deadline = time_limit, time.monotonic() + whole
         self.process = subprocess.Popen(
             [*before, str(program)],
             stdin=subprocess.PIPE,
@@ -150,6 +153,8 @@ class Harness:
             self.process.stdin.write(line.encode() + b"\n")
         except BrokenPipeError:
             self._fall("it ended")
+        if time.monotonic() > self.deadline:
+            self._fall("answers take too long")
         while b"\n" not in self.buffer:
             ready, _, _ = select.select([self.process.stdout], [], [], self.time_limit)
             if not ready:

@@ -24,8 +24,8 @@ def judge(builder, changed, names):
 
         def start(automaton, fmi, running=running):
             program = builder.build(automaton, fmi, "plain", changed)
-            # A second is a thousand times what the longest call of a check takes.
-            running.append(Harness(program, generated(automaton, fmi)[1], time_limit=10.0))
+            # A second is a thousand times what the longest call of a check takes, and what all of them take.
+            running.append(Harness(program, generated(automaton, fmi)[1], time_limit=10.0, whole=30.0))
             return running[-1]
 
         try:
