@@ -308,8 +308,24 @@ def check_times_announced(start):
         assert abs(exchange.next - first) < 1e-15
 
 
+class Pendulum(hm.HybridAutomaton):
+    """Steps of a solver are long, and nothing cuts them short."""
+
+    x = hm.State(2.0)
+    v = hm.State(0.0)
+
+    def flow_map(self, s):
+        return {"x": s.v, "v": -np.sin(s.x)}
+
+
 def check_tolerance_stays_small(start):
-    """A coarse tolerance of the importer does not make event times coarse."""
+    """A coarse tolerance of the importer does not make event times coarse, nor states."""
+    alone = Pendulum()
+    instance = Instance(start(alone, "3.0"), events=False, early=False)
+    instance.begin(0.0, 20.0, 1e-2)
+    instance.do("plain", "end")
+    instance.step(0.0, 20.0)
+    np.testing.assert_allclose(instance.get("x"), hm.simulate(alone, 20.0).at("x", 20.0), rtol=0, atol=STATE_TOLERANCE)
     witness = WITNESSES["mix"]
     arc = python_run(Witness(witness.automaton, 2.0))
     for tolerance in (1e-2, 1e-6, 1e-16):
