@@ -157,7 +157,7 @@ class System:
         MisfitError
             If it is neither an input without a connection nor a tunable parameter.
         """
-        slave, variable = self._owner(name)
+        slave, variable = self.owner(name)
         driving = next((c for c in self.connections if (c.target, c.input) == (slave.name, variable)), None)
         if driving is not None:
             raise MisfitError(f"{name} cannot be given a value, for {driving} drives it: leave one of them out.")
@@ -178,7 +178,7 @@ class System:
 
     def elements(self, name: str) -> list[str]:
         """Return the elements of the array ``slave.variable``, in order; none for a scalar."""
-        slave, variable = self._owner(name)
+        slave, variable = self.owner(name)
         if variable in slave.variable_names:
             return []
         return [f"{slave.name}.{e}" for e in slave.variable_names if e.startswith(f"{variable}[")]
@@ -231,21 +231,27 @@ class System:
 
     def _find(self, scoped: str, what: str) -> tuple[Slave, Port]:
         ports = self._ports(scoped, what)
-        name = self._owner(scoped)[1]
+        name = self.owner(scoped)[1]
         if name not in ports:
-            owner = self._owner(scoped)[0].name
+            owner = self.owner(scoped)[0].name
             raise MisfitError(f"{scoped} is not an {what}; the {what}s of {owner} are {', '.join(ports) or 'none'}.")
-        return self._owner(scoped)[0], ports[name]
+        return self.owner(scoped)[0], ports[name]
 
-    def _owner(self, scoped: str) -> tuple[Slave, str]:
-        """Split the name of a variable into its slave and its own name."""
+    def owner(self, scoped: str) -> tuple[Slave, str]:
+        """Return the slave of ``slave.variable`` and the variable's own name.
+
+        Raises
+        ------
+        MisfitError
+            If it names no slave.
+        """
         owner = next((n for n in sorted(self.slaves, key=len, reverse=True) if scoped.startswith(n + ".")), None)
         if owner is None:
             raise MisfitError(f"{scoped!r} names no slave; the slaves are {', '.join(self.slaves)}.")
         return self.slaves[owner], scoped[len(owner) + 1 :]
 
     def _ports(self, scoped: str, what: str) -> Mapping[str, Port]:
-        slave = self._owner(scoped)[0]
+        slave = self.owner(scoped)[0]
         return slave.inputs if what == "input" else slave.outputs
 
     def _elements(self, target: str, sources: str | Sequence[str]) -> list[tuple[str, str]]:
@@ -265,7 +271,7 @@ class System:
 
     def _places(self, scoped: str, what: str) -> list[str]:
         """Return the places of an array's elements, ``[1]``, in order; none for a scalar."""
-        _, name = self._owner(scoped)
+        _, name = self.owner(scoped)
         ports = self._ports(scoped, what)
         if name in ports:
             return []

@@ -126,6 +126,12 @@ class Scheduler:
         self._arrived: dict[tuple[str, str], Any] = {}
         self._queue: list[tuple[float, int, int, str]] = []
 
+    @property
+    def next_event(self) -> float:
+        """Time in s of the first event that is foreseen; infinity if none is."""
+        self._drop_obsolete()
+        return self._queue[0][0] if self._queue else math.inf
+
     def advance_to(self, limit: float) -> None:
         """Handle all events up to and including `limit` in s, then bring every block there.
 
