@@ -17,7 +17,7 @@ from fmu.describe.description import Description, model_identifier
 from fmu.describe.variable_table import fmu_variables
 from fmu.describe.variables import Fmi
 from fmu.errors import ExportError
-from hybrid_model import Automaton
+from hybrid_model import Automaton, Network
 from hybrid_model.declare.arguments import require_automaton
 from hybrid_model.declare.calls import explained
 from hybrid_model.declare.real_numbers import is_real
@@ -33,7 +33,7 @@ _TOKEN = "place-of-the-instantiation-token"
 
 @explained(ExportError)
 def export_fmu(
-    automaton: Automaton,
+    automaton: Automaton | Network,
     path: str | Path,
     *,
     fmi: Fmi | str = Fmi.V3_0,
@@ -49,8 +49,9 @@ def export_fmu(
 
     Parameters
     ----------
-    automaton : Automaton
-        Any automaton whose maps are written in numpy style.
+    automaton : Automaton or Network
+        Any automaton whose maps are written in numpy style, or copies of one as arrays. Where the parts of a large
+        composition meet only at events, its FMU for Co-Simulation runs them part by part.
     path : str or Path
         File to write; an existing one is replaced.
     fmi : Fmi or str
@@ -84,6 +85,8 @@ def export_fmu(
     fmu.errors.BuildError
         If there is no C compiler, the code does not compile, or the file cannot be written.
     """
+    if isinstance(automaton, Network):
+        automaton = automaton.composition()
     require_automaton("export_fmu", automaton)
     if not isinstance(path, (str, Path)):
         suggested = f"{model_identifier(automaton.name)}.fmu"

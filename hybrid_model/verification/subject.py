@@ -8,13 +8,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.elements import gathered
 from hybrid_model.declare.real_numbers import is_real, real_array, told
 from hybrid_model.declare.signals import InputValue, Signal, require_tunable, unknown_input
 from hybrid_model.declare.signatures import ExplainedCall
 from hybrid_model.declare.transitions import Assignments, Trigger
-from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable
+from hybrid_model.declare.tuning import tuned_value
+from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, unknown_name
 from hybrid_model.errors import DataError, DeclarationError
 from hybrid_model.record.arc import HybridArc
 from hybrid_model.record.samples import Samples
@@ -68,6 +71,8 @@ class Subject:
         With every state; an arc gives its inputs between samples too.
     inputs : mapping, optional
         Input name -> number, array, function of time or `Signal`; tunable parameter -> number, array or `Signal`.
+    starts : mapping, optional
+        Input or parameter -> value of the run in place of the declared one; start values of states are in the data.
 
     Raises
     ------
@@ -78,7 +83,11 @@ class Subject:
     """
 
     def __init__(
-        self, automaton: Automaton, data: Samples | HybridArc, inputs: Mapping[str, InputValue] | None = None
+        self,
+        automaton: Automaton,
+        data: Samples | HybridArc,
+        inputs: Mapping[str, InputValue] | None = None,
+        starts: Mapping[str, npt.ArrayLike] | None = None,
     ) -> None:
         self.automaton = automaton
         self.samples = data.samples() if isinstance(data, HybridArc) else _own_names(automaton, data)
@@ -88,7 +97,8 @@ class Subject:
         self.z = self._columns(self._discrete)
         self.guards = [k for k, info in enumerate(automaton.jumps) if info.trigger is Trigger.STATE]
         self.timed = [k for k, info in enumerate(automaton.jumps) if info.trigger is Trigger.TIME]
-        self._fixed = {v.name: _value(v, v.start.ravel()) for v in automaton.of_kind(Kind.PARAMETER) if not v.tunable}
+        self._starts = _starts(automaton, starts or {})
+        self._fixed = {v.name: self._starts[v.name] for v in automaton.of_kind(Kind.PARAMETER) if not v.tunable}
         self.breakpoints: FloatArray = np.zeros(0)
         self._inputs = self._input_sources(data, inputs or {})
 
@@ -182,7 +192,7 @@ class Subject:
             elif name in self.samples.values:
                 sources[name] = self._sampled(variable, data)
             else:
-                sources[name] = _constant(_value(variable, variable.start.ravel()))
+                sources[name] = _constant(self._starts[name])
         return sources
 
     def _given(self, variable: Variable, value: InputValue) -> InputAt:
@@ -217,6 +227,17 @@ class Subject:
             return _value(variable, (1.0 - part) * column[k] + part * column[k + 1])
 
         return source
+
+
+def _starts(automaton: Automaton, given: Mapping[str, npt.ArrayLike]) -> dict[str, Any]:
+    """Return the values of inputs and parameters at the start of a run that was given some starts."""
+    variables = {v.name: v for v in automaton.of_kind(Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)}
+    found = {name: _value(variable, variable.start.ravel()) for name, variable in variables.items()}
+    for name, value in gathered(automaton.name, {n: v.start for n, v in variables.items()}, given).items():
+        if name not in variables:
+            raise DeclarationError(f"starts: {unknown_name(automaton.name, name, variables)}")
+        found[name] = _value(variables[name], tuned_value(variables[name], value, "start value"))
+    return found
 
 
 def _own_names(automaton: Automaton, samples: Samples) -> Samples:

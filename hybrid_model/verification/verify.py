@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hybrid_model.declare.arguments import require_automaton, require_inputs, require_options
+from hybrid_model.declare.arguments import require_automaton, require_inputs, require_options, require_starts
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.calls import explained
 from hybrid_model.declare.signals import InputValue
@@ -35,6 +35,7 @@ def verify(
     data: Any,
     *,
     inputs: Mapping[str, InputValue] | None = None,
+    starts: Mapping[str, npt.ArrayLike] | None = None,
     tolerances: Tolerances | None = None,
     method: str = "LSODA",
 ) -> Verification:
@@ -58,6 +59,9 @@ def verify(
         first and the last time of the data only. An input that is not given is read
         off the data: those of an arc at every time; a discrete one of samples holds from each sample to the next, a
         continuous one runs straight. One that the data do not have keeps its start value.
+    starts : mapping, optional
+        As in `simulate`: the values of parameters and inputs of that run in place of the declared ones. The states that
+        it began with are in the data.
     tolerances : Tolerances, optional
         How exact the samples are.
     method : str
@@ -79,13 +83,14 @@ def verify(
     """
     require_automaton("verify", automaton)
     require_inputs(inputs)
+    require_starts(starts)
     require_options("tolerances", tolerances, Tolerances, first="rtol")
     data = data if isinstance(data, HybridArc) else _samples(data)
     if isinstance(data, Samples) and not len(data):
         raise DataError(
             f"the data hold no sample, so nothing can be said about {automaton.name}: give at least one row."
         )
-    subject = Subject(automaton, data, inputs)
+    subject = Subject(automaton, data, inputs, starts)
     slack = Slack(subject, tolerances or Tolerances())
     findings = Findings(subject.samples)
     usable = _finite(subject, findings)

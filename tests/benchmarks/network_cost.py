@@ -4,7 +4,8 @@
 trigger; their starts are drawn from one distribution, so each has about as many events in a large ring as in a small
 one. Each row is a process of its own: CPU time of the run without the set-up, least of some rounds for small networks,
 and the largest memory of the process. The rival is a loop around `scipy.integrate.solve_ivp` with one guard, the
-largest error beyond its threshold, which is restarted at each event and at each edge of the gates.
+largest error beyond its threshold, which is restarted at each event and at each edge of the gates. Rows of FMUs are
+their times in a driver in C in event mode, least of three rounds, and the memory of the driver with two instances.
 """
 
 import argparse
@@ -13,12 +14,16 @@ import math
 import resource
 import subprocess
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
 import hybrid_model as hm
+from benchmarks.step_cost import compile_driver, contender, run
+from fmu.export import export_fmu
 from hybrid_model.consensus.graphs.generators import graph_of_kind
 from hybrid_model.consensus.laws.agents import Integrator, agent
 from hybrid_model.consensus.laws.threshold_triggers import DynamicTrigger
@@ -108,6 +113,18 @@ def with_scipy(agents):
     return {"events": events, "seconds": time.process_time() - began, "memory": 0.0, "drift": 0.0}
 
 
+def as_fmu(agents, points=300):
+    """The ring as one FMU, all events handled at the times that it announces, in the driver in C of `step_cost`."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = export_fmu(network("ring", agents), Path(folder) / "ring.fmu", sources=False)
+        ring = contender("ring", path, folder, read=("time",))
+        times = run(compile_driver(folder), [ring], rounds=3, step=END / points, stop=END)["ring"]
+    _, events = times.counts["events announced"]
+    seconds = 1e-9 * min(times.times["events announced"]) * points
+    memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3
+    return {"events": events, "seconds": seconds, "memory": memory}
+
+
 def in_a_process(what, graph, agents):
     call = [sys.executable, "-m", "benchmarks.network_cost", "--row", what, graph, str(agents)]
     return json.loads(subprocess.run(call, check=True, capture_output=True, text=True).stdout)
@@ -117,11 +134,13 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--agents", type=int, nargs="*", default=[100, 1000, 10_000, 100_000])
     parser.add_argument("--graphs", nargs="*", default=["ring", "geometric", "star"])
+    parser.add_argument("--fmus", type=int, nargs="*", default=[100, 1000], help="sizes of rings run as FMUs")
     parser.add_argument("--row", nargs=3, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.row:
-        what, graph, agents = options.row
-        print(json.dumps(with_scipy(int(agents)) if what == "scipy" else measured(graph, int(agents))))
+        what, graph, agents = options.row[0], options.row[1], int(options.row[2])
+        row = {"scipy": lambda: with_scipy(agents), "fmu": lambda: as_fmu(agents)}
+        print(json.dumps(row.get(what, lambda: measured(graph, agents))()))
         return
     print("| graph | agents | events | CPU time in s | per event in us | drift of the mean | memory in MB |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
@@ -136,6 +155,14 @@ def main():
                 f"{1e6 * row['seconds'] / row['events']:.1f} | {row['drift']:.0e} | {row['memory']:.0f} |",
                 flush=True,
             )
+    for agents in options.fmus:
+        row = in_a_process("fmu", "ring", agents)
+        per_event = 1e6 * row["seconds"] / row["events"]
+        print(
+            f"| ring, one FMU | {agents} | {row['events']} | {row['seconds']:.3g} | {per_event:.1f} | | "
+            f"{row['memory']:.0f} |",
+            flush=True,
+        )
     row = in_a_process("scipy", "ring", 100)
     per_event = 1e6 * row["seconds"] / row["events"]
     print(f"| ring, SciPy with one guard | 100 | {row['events']} | {row['seconds']:.3g} | {per_event:.0f} | | |")

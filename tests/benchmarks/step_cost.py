@@ -113,7 +113,7 @@ def euler_ball(folder, optimisation="-O2"):
     return Contender(f"{EULER}, {optimisation}", "3.0", binary, "any", "/", (1, 2), "e")
 
 
-def contender(name, path, folder, embeds=False):
+def contender(name, path, folder, embeds=False, read=READ):
     """An FMU as the driver runs it: extracted, with what its description says."""
     description = fmpy.read_model_description(str(path), validate=False)
     place = Path(tempfile.mkdtemp(dir=folder))
@@ -136,7 +136,7 @@ def contender(name, path, folder, embeds=False):
         binary,
         description.guid if version == "2.0" else description.instantiationToken,
         resources.as_uri() if version == "2.0" else f"{resources}/",
-        tuple(found[variable] for variable in READ),
+        tuple(found[variable] for variable in read),
         capabilities or "-",
         embeds,
     )

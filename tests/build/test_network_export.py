@@ -37,6 +37,22 @@ def network(agents, weights="constant", seed=1):
     return read_scenario(entries)
 
 
+class Listener(hm.HybridAutomaton):
+    """Moves to what it hears, and sends its state where that has moved by a threshold."""
+
+    heard = hm.Input(0.0, discrete=True)
+    x = hm.State(0.0, output=True)
+    sent = hm.DiscreteState(0.0, output=True, computed=True)
+
+    def start_map(self, s):
+        return {"sent": s.x}
+
+    def flow_map(self, s):
+        return {"x": s.heard - s.sent}
+
+    transitions = (hm.Jump("send", lambda self, s: abs(s.x - s.sent) - 0.05, lambda self, s: {"sent": s.x}),)
+
+
 @pytest.mark.parametrize("fmi", ["2.0", "3.0"])
 @pytest.mark.parametrize("weights", ["constant", "gated"])
 def test_a_network_runs_like_the_whole(exported, weights, fmi):
@@ -54,6 +70,19 @@ def test_a_network_runs_like_the_whole(exported, weights, fmi):
     # The limit of the repository for states in different executions; counts of broadcasts are equal.
     np.testing.assert_allclose([run[-1][name] for name in names], expected, rtol=0, atol=1e-8)
     assert [run[-1][name] for name in names[2::3]] == expected[2::3]
+
+
+def test_copies_as_arrays_run_like_the_network_in_this_process(tmp_path):
+    """A ring of 13 agents, each of which hears the one before it, and one that nobody hears."""
+    start = np.random.default_rng(3).uniform(-1.0, 1.0, 14)
+    links = np.arange(13), (np.arange(13) + 12) % 13
+    copies = hm.Network("copies", Listener("listener"), links, {"heard": "sent"}, values={"x": start}, count=14)
+    run = hm.simulate_network(copies, 2.0)
+    path = export_fmu(copies, tmp_path / "copies.fmu", sources=False)
+    names = [f"part{k}.x" for k in range(1, 15)]
+    result = fmpy.simulate_fmu(str(path), stop_time=2.0, output=names, fmi_type="CoSimulation", validate=False)
+    assert len(run.events) > 50
+    np.testing.assert_allclose([result[-1][name] for name in names], run.final("x"), rtol=0, atol=1e-12)
 
 
 def binary_size(path):

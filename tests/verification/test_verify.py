@@ -22,6 +22,7 @@ from hybrid_model.consensus.scenario.files import load_scenario
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import Kind
+from hybrid_model.errors import DeclarationError
 from hybrid_model.models import BouncingBall, RelayHysteresis, Thermostat, TwoTank
 
 G, E = 9.81, 0.7
@@ -653,3 +654,13 @@ def test_the_verifier_uses_nothing_of_the_simulator():
     assert "hybrid_model.declare.automaton" in imported
     forbidden = ("simulate", "reference", "schedule", "native", "solver", "declare.layout")
     assert [name for name in imported if name.startswith(tuple(f"hybrid_model.{room}" for room in forbidden))] == []
+
+
+def test_a_run_from_other_starts_and_parameters_is_one_with_them_only():
+    starts = {"h": 2.5, "e": 0.6}
+    arc = hm.simulate(BouncingBall(), 1.5, starts=starts)
+    assert hm.verify(BouncingBall(), arc, starts=starts)
+    assert hm.verify(BouncingBall(), arc, starts={"e": 0.6})
+    assert any("leads to v" in violation.message for violation in hm.verify(BouncingBall(), arc).violations)
+    with pytest.raises(DeclarationError, match=r"^starts: BouncingBall .*gravity"):
+        hm.verify(BouncingBall(), arc, starts={"gravity": 9.0})

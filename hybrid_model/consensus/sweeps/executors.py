@@ -122,7 +122,7 @@ class DaskCluster:
             # Untyped, as all of Dask is.
             make: Any = Client
             self._client: Any = make(address, timeout=10, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:
+        except (OSError, ValueError, TypeError, RuntimeError) as error:
             raise SweepError(f"no Dask scheduler answers at {address}: {error}.") from error
         self.address = address
 

@@ -133,7 +133,19 @@ bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event)
     return true;
 }
 
-void schedule_predict(Schedule *schedule, uint32_t i)
+/* Looks so many steps ahead; a step that is made again, shorter, counts as one, and may be all of them. */
+static bool look_ahead(Schedule *schedule, uint32_t i, double steps, double *next)
+{
+    Engine *engine = schedule_at(schedule, i);
+    double few = engine->options.look_ahead_steps;
+    engine->options.look_ahead_steps = steps;
+    bool ahead = engine_look_ahead(engine, schedule->stop, next);
+    engine->options.look_ahead_steps = few;
+    bool none = !ahead && engine->status->prediction == PREDICTION_RENEWAL && steps < MOST_ITERATIONS;
+    return none ? look_ahead(schedule, i, 8.0 * steps, next) : ahead;
+}
+
+static void predict(Schedule *schedule, uint32_t i, double steps)
 {
     Part *part = &schedule->parts[i];
     double next;
@@ -143,8 +155,8 @@ void schedule_predict(Schedule *schedule, uint32_t i)
         queue_remove(&schedule->queue, i);
         return;
     }
-    Engine *engine = schedule_at(schedule, i);
-    bool ahead = engine_look_ahead(engine, schedule->stop, &next);
+    const Engine *engine = schedule_at(schedule, i);
+    bool ahead = look_ahead(schedule, i, steps, &next);
     if (needs_another_method(schedule, i))
         return;
     Prediction found = (Prediction)engine->status->prediction;
@@ -159,13 +171,14 @@ void schedule_predict(Schedule *schedule, uint32_t i)
     queue_put(&schedule->queue, i, ahead ? next : now);
 }
 
+void schedule_predict(Schedule *schedule, uint32_t i)
+{
+    predict(schedule, i, engine_options(schedule_at(schedule, i))->look_ahead_steps);
+}
+
 void schedule_predict_far(Schedule *schedule, uint32_t i, double steps)
 {
-    EngineOptions *options = engine_options(schedule_at(schedule, i));
-    double few = options->look_ahead_steps;
-    options->look_ahead_steps = steps;
-    schedule_predict(schedule, i);
-    options->look_ahead_steps = few;
+    predict(schedule, i, steps);
     schedule->parts[i].far = true;
 }
 
