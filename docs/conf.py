@@ -16,8 +16,10 @@ extensions = [
     "sphinx.ext.autodoc",
     "numpydoc",
     "matplotlib.sphinxext.plot_directive",
+    "site_parts.command_help",
     "site_parts.mathml",
     "site_parts.page_links",
+    "site_parts.public_names",
 ]
 
 myst_enable_extensions = ["dollarmath", "colon_fence"]
@@ -26,6 +28,7 @@ nb_execution_mode = "off"  # notebooks keep their outputs, and tests run them
 
 # Members are listed by autodoc, once.
 numpydoc_show_class_members = False
+default_role = "py:obj"
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # numpydoc sections have them in words
 

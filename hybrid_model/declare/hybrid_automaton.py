@@ -44,7 +44,7 @@ class HybridAutomaton(Automaton):
     ----------
     name : str, optional
         Name of the instance; default: the class's.
-    **values : float or array_like or int
+    **values : float or array_like of the declared shape, or int
         Start values, parameter values, and lengths of dimensions, by name.
 
     Raises

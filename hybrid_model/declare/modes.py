@@ -101,6 +101,11 @@ class ModalAutomaton(HybridAutomaton):
     every mode. The discrete state ``mode`` is the index of the present mode; an instance may be given its name:
     ``Heating(mode="off")``.
 
+    Parameters
+    ----------
+    name, **values
+        As in `HybridAutomaton`.
+
     Raises
     ------
     DeclarationError

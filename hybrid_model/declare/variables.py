@@ -144,6 +144,11 @@ class Dimension(ClassAttribute):
 
     ``degree = Dimension()`` and ``neighbours = Input(0.0, shape="degree")`` make a block for any number of
     neighbours: ``Agent(degree=3)``, or ``Agent(neighbours=[1.0, 2.0, 0.3])``.
+
+    Parameters
+    ----------
+    description : str
+        For people.
     """
 
     def __init__(self, description: str = "") -> None:
@@ -159,7 +164,7 @@ class Declaration(ExplainedCall, ClassAttribute):
 
     Parameters
     ----------
-    start : float or array_like
+    start : float or array_like, of the declared shape
         Start value; a scalar stands for every element when a shape is given.
     unit, description : str
         See `Variable`.
@@ -309,7 +314,7 @@ class State(Declaration):
 
     Parameters
     ----------
-    start : float or array_like
+    start : float or array_like, of the declared shape
         Start value.
     output : bool
         Whether the state is also an output of the block.
@@ -332,7 +337,7 @@ class DiscreteState(Declaration):
 
     Parameters
     ----------
-    start : float or array_like
+    start : float or array_like, of the declared shape
         Start value.
     output, computed : bool
         As in `State`.
@@ -364,7 +369,7 @@ class Parameter(Declaration):
 
     Parameters
     ----------
-    start : float or array_like
+    start : float or array_like, of the declared shape
         Its value unless an instance is given another.
     integer : bool
         Whether it holds whole numbers.
@@ -386,7 +391,7 @@ class Input(Declaration):
 
     Parameters
     ----------
-    start : float or array_like
+    start : float or array_like, of the declared shape
         Its value while nothing is connected.
     discrete : bool
         Whether it changes only at events. A block whose inputs are all discrete can predict its next event.
@@ -418,7 +423,15 @@ class Output(Declaration):
 
 
 class Values:
-    """The values of an automaton's variables at one instant: ``s.h``, ``s["agent1.x"]``, and the time ``s.t``."""
+    """The values of an automaton's variables at one instant: ``s.h``, ``s["agent1.x"]``, and the time ``s.t``.
+
+    Parameters
+    ----------
+    owner : str
+        Name of the automaton, for messages.
+    values : dict
+        Variable -> its value, of its shape; ``t`` is the time in s.
+    """
 
     __slots__ = ("_owner", "_values")
     _owner: str

@@ -265,7 +265,7 @@ def lti(
         Names of the scalar inputs and outputs; default: the system's labels.
     state : str
         Name of the state vector.
-    start : float or array_like
+    start : float or array_like, shape (states,)
         State at the start.
 
     Returns

@@ -31,7 +31,7 @@ def curve(
 
     Returns
     -------
-    t : ndarray, shape (n,)
+    t : ndarray, shape (n,), in s
     values : ndarray, shape (n, ...)
     """
     start = arc.t[0] if t_start is None else t_start

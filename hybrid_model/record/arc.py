@@ -124,12 +124,12 @@ class HybridArc:
         ----------
         name : str
             A variable of the automaton, or an element of one, counted from 1 as in FMUs and plots: ``v[1]``.
-        t : float or array_like
+        t : float or array_like, any shape
             Times in s within the run.
         before : bool
             At the time of a jump return the value before it (in a cascade, before the first); default: after the last
             jump at that time.
-        j : int or array_like, optional
+        j : int or array_like, any shape, optional
             Jump counts: the value at hybrid time (t, j), so that every side of every jump of a cascade can be had.
 
         Returns
@@ -248,7 +248,7 @@ class HybridArc:
     # Jumps and lengths.
 
     def event_times(self, name: str) -> FloatArray:
-        """Return the times in s of the jumps called `name`."""
+        """Return the times in s of the jumps called `name`; DeclarationError if there are none of that name."""
         if name not in [info.name for info in self.automaton.jumps]:
             known = {info.name: info for info in self.automaton.jumps}
             raise DeclarationError(unknown_name(f"{self.automaton.name} (jumps)", name, known))

@@ -21,7 +21,7 @@ class JumpRecord:
         Number of the jump among the automaton's jumps.
     name : str
         Its name.
-    x_before, z_before, x_after, z_after : ndarray
+    x_before, z_before, x_after, z_after : ndarray, of shape (number of scalar states,)
         Continuous and discrete states on both sides.
     """
 

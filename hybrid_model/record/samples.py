@@ -29,7 +29,7 @@ class Samples:
     ----------
     t, j : ndarray, shape (n,)
         Time in s and number of jumps so far. A jump is two rows with the same t and the next j.
-    values : mapping of str to ndarray, shape (n, *shape)
+    values : mapping of str to ndarray, shape (n, ...)
         Variable -> its values, row by row.
 
     Raises

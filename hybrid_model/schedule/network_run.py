@@ -62,19 +62,19 @@ class NetworkRun:
         return self._arc(part).event_times(jump)
 
     def final(self, name: str) -> FloatArray:
-        """Return a state of all parts at the end of the run, shape (parts, *shape of the state)."""
+        """Return a state of all parts at the end of the run, shape ``(parts, *shape of the state)``."""
         if self._make_final is not None:
             return self._make_final(name)
         return np.array([arc.at(name, arc.t[-1]) for arc in self.arcs.values()])
 
     def at(self, name: str, times: npt.ArrayLike, parts: Sequence[str] | None = None) -> FloatArray:
-        """Return a variable of some parts at times in s, shape (parts, times, *shape of the variable).
+        """Return a variable of some parts at times in s, shape ``(parts, times, *shape of the variable)``.
 
         Parameters
         ----------
         name : str
             Of the variable.
-        times : array_like
+        times : array_like, shape (times,)
             In s.
         parts : sequence of str, optional
             Default: all of them.

@@ -1,4 +1,4 @@
-"""`certify`: every bound of a scenario in every form, with its hypotheses, unit and source, beside what a run shows."""
+"""`certify`: every bound of a scenario in every form, with hypotheses, unit and source in paper or audit, and a run."""
 
 from __future__ import annotations
 

@@ -2,7 +2,8 @@
 
 In disagreement coordinates the system is ``xi' = -k N (xi + U^T e)``, ``x_e = D^T U xi``. Its gain at frequency zero
 is ``-D^T``: constant errors shift the agents by minus the errors. No frequency has a larger one, because
-``k N (jw + k N)^-1`` is a contraction; so the H-infinity norm is ``||D||``, whatever the weights and the gain k.
+``k N (jw + k N)^-1`` is a contraction; so the H-infinity norm is ``||D||``, whatever the weights and the gain k
+(audit, section 7).
 """
 
 from __future__ import annotations

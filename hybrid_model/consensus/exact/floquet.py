@@ -51,7 +51,7 @@ class FloquetSpectrum:
 
 
 def floquet_spectrum(scenario: Scenario) -> FloquetSpectrum:
-    """Floquet multipliers of the network without trigger errors, in the disagreement coordinates of audit section 1.
+    """Floquet multipliers of a `scenario` without trigger errors, in the disagreement coordinates of audit section 1.
 
     Raises
     ------

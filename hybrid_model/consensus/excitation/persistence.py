@@ -1,4 +1,4 @@
-"""Persistence of excitation: the constants (mu1, mu2, T) of a network's weights.
+"""Persistence of excitation: the constants (mu1, mu2, T) of a network's weights (paper, definition 1; audit, 2).
 
 All signals of interest have the form ``S(t) = F diag(w(t)) F^T`` with a constant factor F, so the integral over a
 window follows from the exact integrals of the weights. What is left is a search over the starts of the windows.
@@ -107,7 +107,7 @@ def signal_factor(scenario: Scenario, signal: Signal, partition: TreePartition |
 def scenario_excitation(
     scenario: Scenario, signal: Signal, partition: TreePartition | None = None, window: float | None = None
 ) -> ExcitationConstants:
-    """`excitation_constants` of one signal of a scenario; see there for `window` and the errors.
+    """`excitation_constants` of one signal of a scenario, along the tree of `partition`; `window` and errors as there.
 
     Without a period the constants are those of the windows inside the run, as their `horizon` says.
     """

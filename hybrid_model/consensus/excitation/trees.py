@@ -1,4 +1,4 @@
-"""Excitation along each spanning tree of the union graph."""
+"""Excitation along each spanning tree of the union graph (paper, theorem 2)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -130,22 +130,22 @@ def reorient(edges: tuple[Edge, ...], turned: ArrayLike) -> tuple[Edge, ...]:
 
 
 def path_graph(agents: int) -> AgentGraph:
-    """Agents in a row: n - 1 edges."""
+    """So many `agents` in a row: n - 1 edges."""
     return agent_graph(nx.path_graph(_enough(agents, 2)))
 
 
 def ring_graph(agents: int) -> AgentGraph:
-    """Agents in a circle, at least three: n edges."""
+    """So many `agents` in a circle, at least three: n edges."""
     return agent_graph(nx.cycle_graph(_enough(agents, 3)))
 
 
 def star_graph(agents: int) -> AgentGraph:
-    """Agent 1 joined to all others: n - 1 edges."""
+    """Agent 1 of so many `agents` joined to all others: n - 1 edges."""
     return agent_graph(nx.star_graph(_enough(agents, 2) - 1))
 
 
 def complete_graph(agents: int) -> AgentGraph:
-    """Every agent joined to every other: n (n - 1)/2 edges."""
+    """Every one of so many `agents` joined to every other: n (n - 1)/2 edges."""
     return agent_graph(nx.complete_graph(_enough(agents, 2)))
 
 
@@ -175,9 +175,23 @@ def regular_graph(agents: int, degree: int, seed: int, *, connected: bool = True
 
 
 def erdos_renyi_graph(agents: int, probability: float, seed: int, *, connected: bool = True) -> AgentGraph:
-    """Each pair of agents is joined with the same probability, independently; parameters as `regular_graph`.
+    """Each pair of agents is joined with the same probability, independently.
 
-    With `connected` the graph is drawn from those of this family that are connected.
+    Parameters
+    ----------
+    agents : int
+        n, at least 2.
+    probability : float
+        From 0 to 1.
+    seed : int
+        Of the random generator.
+    connected : bool
+        Whether to draw until the graph is connected.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range, or none of many draws is connected.
     """
     _in_unit_interval("probability", probability)
     count = _enough(agents, 2)
@@ -189,8 +203,23 @@ def erdos_renyi_graph(agents: int, probability: float, seed: int, *, connected: 
 def geometric_graph(agents: int, radius: float, seed: int, *, connected: bool = True) -> AgentGraph:
     """Agents at random places of the unit square; those at most `radius` apart are joined.
 
-    Parameters as `regular_graph`. The weights are 1; `AgentGraph.positions` has the places, for weights that depend on
-    the distance.
+    The weights are 1; `AgentGraph.positions` has the places, for weights that depend on the distance.
+
+    Parameters
+    ----------
+    agents : int
+        n, at least 2.
+    radius : float
+        Positive, in sides of the square.
+    seed : int
+        Of the random generator.
+    connected : bool
+        Whether to draw until the graph is connected.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range, or none of many draws is connected.
     """
     if not radius > 0:
         raise ValueError(f"radius is {radius}; it must be positive.")
@@ -203,14 +232,25 @@ def small_world_graph(
 ) -> AgentGraph:
     """A ring in which each agent is joined to its nearest neighbours, with some edges rewired at random.
 
-    D. J. Watts, S. H. Strogatz, Nature 393 (1998) 440-442. Parameters as `regular_graph`, and:
+    D. J. Watts, S. H. Strogatz, Nature 393 (1998) 440-442.
 
     Parameters
     ----------
+    agents : int
+        n.
     neighbours : int
         Nearest neighbours of each agent in the ring, even and below n.
     rewiring : float
         Probability, from 0 to 1, that an edge is rewired.
+    seed : int
+        Of the random generator.
+    connected : bool
+        Whether to draw until the graph is connected.
+
+    Raises
+    ------
+    ValueError
+        If a number is out of range, or none of many draws is connected.
     """
     _in_unit_interval("rewiring", rewiring)
     if neighbours % 2 or not 2 <= neighbours < agents:

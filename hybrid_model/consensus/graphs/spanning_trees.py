@@ -37,9 +37,9 @@ def spanning_tree(agents: int, edges: Sequence[Edge]) -> tuple[int, ...]:
 
 
 def spanning_tree_count(agents: int, edges: Sequence[Edge]) -> int:
-    """Number of spanning trees, by Kirchhoff's matrix-tree theorem: any cofactor of the Laplacian.
+    """Number of spanning trees of a graph with so many `agents` and these `edges`.
 
-    Exact as long as the number is below about 1e15.
+    By Kirchhoff's matrix-tree theorem: any cofactor of the Laplacian. Exact as long as the number is below about 1e15.
     """
     matrix = weighted_laplacian(agents, edges, np.ones(len(edges)))
     return round(float(np.linalg.det(matrix[1:, 1:])))
@@ -48,8 +48,8 @@ def spanning_tree_count(agents: int, edges: Sequence[Edge]) -> int:
 def all_spanning_trees(agents: int, edges: Sequence[Edge]) -> Iterator[tuple[int, ...]]:
     """All spanning trees as ascending tuples of edge numbers from 1, in lexicographic order; none if not connected.
 
-    The work is proportional to their number, which `spanning_tree_count` tells in advance: ``n**(n - 2)`` for the
-    complete graph.
+    Of a graph with so many `agents` and these `edges`. The work is proportional to their number, which
+    `spanning_tree_count` tells in advance: ``n**(n - 2)`` for the complete graph.
     """
     validate_edges(agents, edges)
     if not is_connected(agents, edges):

@@ -1,4 +1,4 @@
-"""The agents of a scenario as a network that runs part by part: as arrays where they are copies of few agents."""
+"""The agents (paper, section 4) as a network that runs part by part: as arrays where they are copies of few agents."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The agent: its motion on broadcast values, an event generator that decides when to broadcast, and what it hears."""
+"""The agent (paper, section 4): its motion on broadcast values, its event generator, and what it hears."""
 
 from __future__ import annotations
 

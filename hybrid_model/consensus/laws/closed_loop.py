@@ -1,4 +1,4 @@
-"""From a scenario to automata: the agents, their wiring, and the closed loop composed of them."""
+"""From a scenario to automata: the agents, their wiring, and the closed loop composed of them (paper, section 4)."""
 
 from __future__ import annotations
 
@@ -60,9 +60,10 @@ def scenario_agents(scenario: Scenario, motion: type[hm.HybridAutomaton] | None 
 
 
 def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
-    """Return which broadcasts each agent receives, as ``"agent1.neighbours"`` -> ``["agent2.broadcast", ...]``.
+    """Return which broadcasts each agent of a `scenario` receives.
 
-    Over a channel that delays or loses broadcasts, agents also receive the senders' counts, as ``"agent1.sent"``.
+    ``"agent1.neighbours"`` -> ``["agent2.broadcast", ...]``. Over a channel that delays or loses broadcasts,
+    agents also receive the senders' counts, as ``"agent1.sent"``.
     """
     wires = {}
     for i in range(1, scenario.network.agents + 1):

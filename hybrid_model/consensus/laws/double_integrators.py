@@ -108,7 +108,7 @@ def double_integrator_agents(
 
 
 def double_integrator_wires(scenario: Scenario) -> dict[str, list[str]]:
-    """Return which broadcasts each agent of `double_integrator_agents` receives."""
+    """Return which broadcasts each agent of ``double_integrator_agents(scenario, ...)`` receives."""
     wires = {}
     for i in range(1, scenario.network.agents + 1):
         others = [other_end(scenario, edge, i) for edge in edges_of(scenario, i)]
@@ -118,7 +118,7 @@ def double_integrator_wires(scenario: Scenario) -> dict[str, list[str]]:
 
 
 def double_integrator_loop(scenario: Scenario, velocities: npt.ArrayLike, damping: float = 1.0) -> hm.Composition:
-    """Compose the agents of `double_integrator_agents` to one automaton; parameters and errors as there."""
+    """Compose ``double_integrator_agents(scenario, velocities, damping)`` to one automaton; errors as there."""
     agents = double_integrator_agents(scenario, velocities, damping)
     return hm.Composition(scenario.name, agents, double_integrator_wires(scenario))
 

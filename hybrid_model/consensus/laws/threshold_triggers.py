@@ -1,4 +1,4 @@
-"""Event generators: automata that hold the value last broadcast and decide when to broadcast anew."""
+"""Event generators: they hold the value last broadcast and decide when to broadcast anew (paper, section 4)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Agents whose state is a vector in R^d: one event for all its elements, when the norm of the error is too large."""
+"""Agents in R^d: one event for all elements, when the norm of the error is too large (law: paper, section 4)."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def vector_agents(scenario: Scenario, initial: npt.ArrayLike) -> dict[str, hm.Co
 
 
 def vector_loop(scenario: Scenario, initial: npt.ArrayLike) -> hm.Composition:
-    """Compose the agents of `vector_agents` to one automaton; parameters and errors as there."""
+    """Compose the agents of ``vector_agents(scenario, initial)`` to one automaton; errors as there."""
     return hm.Composition(scenario.name, vector_agents(scenario, initial), vector_wires(scenario))
 
 

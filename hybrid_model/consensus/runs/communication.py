@@ -66,7 +66,7 @@ class GapStatistics:
 
 
 def gap_statistics(event_times: Sequence[ArrayLike]) -> GapStatistics:
-    """Gaps of several agents from the times [s] of their broadcasts; the one at the start is no event."""
+    """Gaps of several agents; `event_times` are the times [s] of each one's broadcasts, without that at the start."""
     rows = [np.diff(np.asarray(times, dtype=float)) for times in event_times]
     return GapStatistics(np.sort(np.concatenate([np.empty(0), *rows])))
 
@@ -106,7 +106,7 @@ def communication(scenario: Scenario, event_times: Sequence[ArrayLike], duration
     ----------
     scenario : Scenario
         Network and switching.
-    event_times : sequence of array_like
+    event_times : sequence of array_like, each of shape (events,)
         Times [s] of each agent's broadcasts, as in `RunReport.event_times`.
     duration : float, optional
         Of the run [s]; the stop time by default.

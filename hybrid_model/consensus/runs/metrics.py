@@ -86,7 +86,7 @@ def performance(
         What ran.
     states : callable
         Its states, from `run_states` or `PeriodicRun.at`.
-    event_times : sequence of array_like, optional
+    event_times : sequence of array_like, each of shape (events,), optional
         Times [s] of broadcasts, where the states have kinks.
     level : float, optional
         Of the settling time; by default a twentieth of the disagreement at the start.
@@ -148,7 +148,10 @@ def settling_time(
 
 
 def run_metrics(scenario: Scenario, arc: HybridArc, level: float | None = None) -> dict[str, Any]:
-    """All metrics of a run of ``closed_loop(scenario)`` as one object for JSON; of its part if it ended early."""
+    """All metrics of a run `arc` of ``closed_loop(scenario)`` as one object for JSON; `level` as in `performance`.
+
+    Of a run that ended early those of its part.
+    """
     scenario = replace(scenario, stop_time=float(arc.t[-1]))
     times = run_report(scenario, arc).event_times
     sent, gaps = communication(scenario, times), gap_statistics(times)

@@ -19,9 +19,9 @@ class RunReport:
 
     Attributes
     ----------
-    event_times : list of ndarray
+    event_times : list of ndarray, each of shape (events,)
         Times in s of each agent's broadcasts, without the one at the start.
-    x_end : ndarray
+    x_end : ndarray, shape (agents,)
         Final states.
     edge_norm_end : float
         Norm of the final edge states over the underlying graph.

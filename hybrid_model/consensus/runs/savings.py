@@ -129,7 +129,7 @@ class Savings:
 
 
 def run_savings(scenario: Scenario, arc: HybridArc, level: float | None = None) -> Savings:
-    """Compare a run of ``closed_loop(scenario)`` with periodic broadcasting; see `savings`."""
+    """Compare a run `arc` of ``closed_loop(scenario)`` with periodic broadcasting; `level` as in `performance`."""
     return savings(scenario, run_states(scenario, arc), run_report(scenario, arc).event_times, level)
 
 

@@ -32,7 +32,7 @@ def joint_connectivity_window(
 
     Parameters
     ----------
-    agents, edges
+    agents, edges : int, sequence of Edge
         The network.
     switching : Switching
         Which edges are active when.

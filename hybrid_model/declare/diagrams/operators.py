@@ -215,6 +215,7 @@ def _free(name: str, parts: Mapping[str, Automaton]) -> str:
 
 
 def _by_operator(self: Automaton, operator: str, other: object) -> Automaton:
+    """What the operators do with an automaton and the `other` operand: a composition."""
     if operator == "gain" and is_real(other):
         return scaled(f"{other:g}*{self.name}", self, float(other))  # type: ignore[arg-type]
     if not isinstance(other, Automaton):
