@@ -16,6 +16,7 @@ from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.forms import Certified, Quantity
 from hybrid_model.consensus.certificates.sizes import LARGE
 from hybrid_model.consensus.figures.conservatism import save_certificate_figures
+from hybrid_model.consensus.figures.style import require_formats
 from hybrid_model.consensus.laws.agent_network import agent_network
 from hybrid_model.consensus.laws.closed_loop import closed_loop
 from hybrid_model.consensus.scenario.files import load_scenario
@@ -23,6 +24,8 @@ from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 SOURCES = "paper = Arun Kumar, Chowdhury, Srikant, Raisch; audit = docs/paper-audit.md of this project"
 """What the short names in the sources of values mean."""
+MOST_DRAWN = 100
+"""Agents that figures can show."""
 _RUN, _BOUNDS, _FIGURES = 1.0, 8.0, 6.0
 """About how long these stages take, as parts of the whole."""
 
@@ -30,6 +33,8 @@ _RUN, _BOUNDS, _FIGURES = 1.0, 8.0, 6.0
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     scenario = load_scenario(options.scenario)
+    formats = options.figure_format or ["png", "pdf"]
+    require_formats(formats)
     zeno = hm.ZenoGuard(max_jumps=options.max_jumps)
     large = scenario.network.agents >= LARGE and scenario.trigger.kind is not TriggerKind.CONTINUOUS
     arc: hm.HybridArc | hm.NetworkRun
@@ -44,12 +49,18 @@ def run(options: argparse.Namespace) -> int:
         document = json.dumps(_document(found, details=options.details), indent=2)
         if options.out:
             with results_folder(options.out, "certify") as folder:
-                if isinstance(arc, hm.HybridArc):
+                if scenario.network.agents <= MOST_DRAWN:
                     work.begin("drawing the figures", _FIGURES)
-                    save_certificate_figures(found, arc, folder)
+                    # Figures read the agents' curves off one arc.
+                    whole = (
+                        arc
+                        if isinstance(arc, hm.HybridArc)
+                        else hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=zeno)
+                    )
+                    save_certificate_figures(found, whole, folder, formats)
                 (folder / "certificates.json").write_text(document + "\n", encoding="utf-8")
-    if options.out and large:
-        print(f"hybrid-fmu: figures are of networks with fewer than {LARGE} agents.", file=sys.stderr)
+    if options.out and scenario.network.agents > MOST_DRAWN:
+        print(f"hybrid-fmu: figures are of networks with {MOST_DRAWN} agents or fewer.", file=sys.stderr)
     print(document if options.json else _text(found))
     # Bounds are there also where the thresholds vanish too fast for the run; a note says how far it came.
     return Exit.DONE if arc.stop is hm.Stop.JUMPS else exit_of(arc.stop.name)

@@ -24,6 +24,7 @@ from hybrid_model.consensus.certificates.analysis import Analysis, analyse
 from hybrid_model.consensus.certificates.certify import Certificates, certify
 from hybrid_model.consensus.certificates.tree_bound import BoundForm, ConvergenceBound, convergence_bound
 from hybrid_model.consensus.figures.run import save_paper_figures
+from hybrid_model.consensus.figures.style import require_formats
 from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop, scenario_agents
 from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
 from hybrid_model.consensus.scenario.definition import Scenario, replace_trigger
@@ -71,6 +72,8 @@ class Comparison:
 
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
+    formats = options.figure_format or ["png", "pdf"]
+    require_formats(formats)
     dynamic = load_scenario(PRESET)
     scenarios = {"static": replace_trigger(dynamic, "static"), "dynamic": dynamic}
     # Both have one network: what is known of it is computed once.
@@ -79,7 +82,8 @@ def run(options: argparse.Namespace) -> int:
         comparisons = {kind: _compare(kind, scenario, analysis, out, work) for kind, scenario in scenarios.items()}
         work.begin("drawing the figures", _FIGURES)
         for kind, comparison in comparisons.items():
-            save_paper_figures(kind, comparison.scenario, comparison.arc, list(comparison.bounds.values()), out)
+            bounds = list(comparison.bounds.values())
+            save_paper_figures(kind, comparison.scenario, comparison.arc, bounds, out, comparison.certificates, formats)
         document = json.dumps(_summary(comparisons), indent=2)
         (out / "summary.json").write_text(document + "\n", encoding="utf-8")
     if options.json:

@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import json
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,8 @@ def run(options: argparse.Namespace) -> int:
             report, times, signals = _as_one(scenario, options.output_interval, _wanted(options))
         else:
             report, times, signals = _as_network(scenario, options, work)
+        if options.animation:
+            _film(scenario, options.animation, work)
     document = json.dumps({"scenario": scenario.name, **report.as_dict(), "message": report.message}, indent=2)
     if options.out:
         with results_folder(options.out, "simulate") as folder:
@@ -59,6 +62,15 @@ def run(options: argparse.Namespace) -> int:
         write_columns(options.output_file, table, {"time": "s"}, about)
     print(document if options.json else _text(scenario, report))
     return exit_of(report.stop)
+
+
+def _film(scenario: Scenario, path: Path, work: Work) -> None:
+    # Of what a run alone does not need.
+    from hybrid_model.consensus.figures.animation import require_film, save_animation
+
+    require_film(path)
+    work.begin("drawing the film", 10.0)
+    save_animation(scenario, hm.simulate(closed_loop(scenario), scenario.stop_time), path, progress=work)
 
 
 def _wanted(options: argparse.Namespace) -> bool:

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fmu.archives.writing import replacing
+
 MOST_AXES = 8
 """Most axes in one picture; further signals share them."""
 
@@ -44,8 +46,8 @@ def draw(
         axes[0, 0].set_title(title)
         axes[-1, 0].set_xlabel(TIME)
         if path is not None:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(path)
+            with replacing(path) as part:
+                figure.savefig(part, format=path.suffix[1:].lower())
         if show:
             plt.show()
         plt.close(figure)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
+from matplotlib.collections import EventCollection
 
 from hybrid_model.declare.variables import FloatArray, unknown_name
 from hybrid_model.errors import DeclarationError
@@ -48,9 +49,13 @@ def plot_raster(events: Events, *names: str, ax: Axes | None = None, **line_opti
     ax = new_axes(ax)
     rows = range(len(times))
     options: dict[str, Any] = {"linelengths": 0.7, "linewidths": 1.0, "colors": "k"} | line_options
-    if times:  # without rows eventplot has no limits to set
-        ax.eventplot(list(times.values()), lineoffsets=rows, **options)
+    # Without rows eventplot has no limits to set.
+    drawn: list[EventCollection] = []
+    if times:
+        drawn = list(np.atleast_1d(ax.eventplot(list(times.values()), lineoffsets=rows, **options)))  # type: ignore
     _show_whole_run(ax, events)
+    for collection in drawn:
+        _keep_apart(ax, collection)
     labels, common = short_names(list(times))
     step = max(1, math.ceil(len(times) / ROWS))
     ax.set_yticks(rows[::step], labels[::step])
@@ -58,6 +63,29 @@ def plot_raster(events: Events, *names: str, ax: Axes | None = None, **line_opti
     ax.set_xlabel(TIME)
     ax.set_ylabel(common)
     return ax
+
+
+def _keep_apart(ax: Axes, row: EventCollection) -> None:
+    """Draw events that lie closer than their lines are wide in halves of the row in turn: two stay two."""
+    times = np.sort(row.get_positions())
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    low, high = ax.get_xlim()
+    points = 72.0 * figure.get_size_inches()[0] * ax.get_position().width
+    near = np.diff(times) < 2.0 * float(np.max(row.get_linewidth())) / points * (high - low)
+    if not near.any():
+        return
+    touching = np.concatenate([near, [False]]) | np.concatenate([[False], near])
+    # The place of an event in its cluster.
+    place = np.zeros(times.size, dtype=int)
+    for k in range(1, times.size):
+        place[k] = place[k - 1] + 1 if near[k - 1] else 0
+    middle, length = row.get_lineoffset(), float(np.max(row.get_linelength()))
+    top, bottom = middle + length / 2.0, middle - length / 2.0
+    gap = 0.06 * length
+    low_end = np.where(touching & (place % 2 == 0), middle + gap, bottom)
+    high_end = np.where(touching & (place % 2 == 1), middle - gap, top)
+    row.set_segments([[(t, a), (t, b)] for t, a, b in zip(times, low_end, high_end, strict=True)])
 
 
 def plot_inter_event_times(

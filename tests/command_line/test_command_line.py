@@ -6,8 +6,10 @@ import json
 import sys
 from importlib.metadata import version
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
+from PIL import Image, ImageChops
 from small_scenario import small_scenario
 
 import hybrid_model as hm
@@ -17,6 +19,7 @@ from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall
 
 SMALL = small_scenario()
+README_PICTURE = Path(__file__).parents[2] / "docs" / "figures" / "dynamic_states.png"
 
 
 @pytest.fixture
@@ -210,6 +213,9 @@ def test_paper_reproduces_compares_and_draws(steps, tmp_path, capsys, monkeypatc
         for figure in ("states", "edge_norm"):
             assert (tmp_path / f"{kind}_{figure}.png").stat().st_size > 10_000
             assert (tmp_path / f"{kind}_{figure}.pdf").stat().st_size > 3_000
+    # The picture of the README is this one.
+    shown, drawn = (Image.open(p).convert("L") for p in (README_PICTURE, tmp_path / README_PICTURE.name))
+    assert ImageChops.difference(shown, drawn).histogram()[32:] == [0] * 224
     table = capsys.readouterr().out
     assert "FMUs through fmpy                35  4, 10, 13, 8" in table
 

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from cosim.cli.options.values import add_folder, add_json, add_most_jumps, add_scenario, positive, require_scenario
+from cosim.cli.options.values import (
+    add_folder,
+    add_formats,
+    add_json,
+    add_most_jumps,
+    add_scenario,
+    positive,
+    require_scenario,
+)
 
 EXAMPLES = ("hybrid-fmu certify paper-a", "hybrid-fmu certify ring.toml --json --details --out certificates")
 PATIENCE = 5.0
@@ -29,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "would take longer is left out (default: %(default)s)",
     )
     add_folder(parser, "--out", "write certificates.json, and figures of the run with its bounds, there")
+    add_formats(parser)
 
 
 require_named = require_scenario

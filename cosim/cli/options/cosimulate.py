@@ -144,6 +144,8 @@ def require_named(options: argparse.Namespace) -> None:
                 f"--stop-time {options.stop_time:g}: the run starts at {start:g} s; give the stop after the start."
             )
     require_table(options.output_file)
+    if options.plot is not None and options.plot.suffix.lower() not in (".png", ".pdf", ".svg", ".pgf"):
+        raise UsageError(f"{options.plot}: pictures are .png, .pdf, .svg or .pgf files; give one of these endings.")
     for file in (options.input_file, options.reference_file):
         if file is not None:
             require_file(file, "a table of comma-separated values")

@@ -6,11 +6,13 @@ import argparse
 from pathlib import Path
 
 from cosim.cli.options.values import add_folder, add_json, add_scenario, require_scenario, require_table, seconds
+from cosim.errors import UsageError
 
 EXAMPLES = (
     "hybrid-fmu simulate paper-a",
     "hybrid-fmu simulate paper-a --stop-time 10 --out run",
     "hybrid-fmu simulate paper-a --output-file run.mat",
+    "hybrid-fmu simulate paper-a --animation run.gif",
     "hybrid-fmu simulate ring.toml --engine network --events events",
 )
 
@@ -37,6 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output-file", type=Path, metavar="F", help="write the trajectory there: .csv, .npz, .mat or .nc by the name"
     )
+    parser.add_argument(
+        "--animation", type=Path, metavar="F", help="write the run as a film there: .gif, or .mp4 where there is ffmpeg"
+    )
     add_folder(parser, "--out", "write run.json and trajectory.csv there")
     add_folder(
         parser,
@@ -49,3 +54,5 @@ def require_named(options: argparse.Namespace) -> None:
     """Refuse what is no scenario, and files of other kinds than are written."""
     require_scenario(options)
     require_table(options.output_file)
+    if options.animation is not None and options.animation.suffix.lower() not in (".gif", ".mp4"):
+        raise UsageError(f"{options.animation}: films are .gif or .mp4 files; give one of these endings.")

@@ -86,6 +86,16 @@ def add_folder(parser: argparse.ArgumentParser, name: str, help: str, default: P
     parser.add_argument(name, type=Path, metavar="DIR", default=default, help=help)
 
 
+def add_formats(parser: argparse.ArgumentParser) -> None:
+    """Add ``--figure-format``."""
+    parser.add_argument(
+        "--figure-format",
+        action="append",
+        choices=("png", "pdf", "svg", "pgf"),
+        help="of figures; repeatable; pgf where there is TeX (default: png and pdf)",
+    )
+
+
 def require_scenario(options: argparse.Namespace) -> None:
     """Refuse what is no scenario: an FMU, code, a table; or a name that no preset has.
 

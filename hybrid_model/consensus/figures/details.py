@@ -16,12 +16,13 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from hybrid_model.consensus.figures.run import plot_broadcasts, plot_error_against_threshold
-from hybrid_model.consensus.figures.style import COLUMN, DASHES, MARKER, VIOLATED, legend_above, over_time
+from hybrid_model.consensus.figures.style import COLUMN, DASHES, MARKER, VIOLATED, height_of, legend_above, over_time
 from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of
 from hybrid_model.consensus.runs.communication import gap_statistics
 from hybrid_model.consensus.runs.metrics import States, disagreement
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.plots import COLORS, new_axes, plot_inter_event_times
+from hybrid_model.plots.events import LEGEND_ROWS
 from hybrid_model.record.arc import HybridArc
 
 __all__ = [
@@ -33,10 +34,14 @@ __all__ = [
 ]
 
 SHADE = "#d9d9d9"
+MOST_AXES = 12
+"""Agents that have axes of their own."""
 
 
 def plot_all_errors(scenario: Scenario, arc: HybridArc, columns: int = 2) -> Figure:
     """Draw the error of every agent against the threshold, one pair of axes an agent, all with the same limits.
+
+    Of more than `MOST_AXES` agents it is an image, a row an agent: which part of the threshold the error is.
 
     Parameters
     ----------
@@ -52,6 +57,8 @@ def plot_all_errors(scenario: Scenario, arc: HybridArc, columns: int = 2) -> Fig
     Figure
     """
     n = scenario.network.agents
+    if n > MOST_AXES:
+        return _error_image(scenario, arc)
     rows = math.ceil(n / columns)
     figure, grid = plt.subplots(
         rows,
@@ -77,6 +84,27 @@ def plot_all_errors(scenario: Scenario, arc: HybridArc, columns: int = 2) -> Fig
     threshold = next(line for line in grid.flat[0].lines if str(line.get_label()).startswith("threshold"))
     broadcast = Line2D([], [], color="0.3", label="broadcast", **MARKER)
     figure.legend(handles=[threshold, broadcast], loc="outside upper right", ncols=2)
+    return figure
+
+
+def _error_image(scenario: Scenario, arc: HybridArc) -> Figure:
+    n = scenario.network.agents
+    grid = np.linspace(0.0, float(arc.t[-1]), 801)
+    # Largest in each cell, so that no short peak is lost.
+    fine = np.linspace(0.0, float(arc.t[-1]), 4 * 800 + 1)
+    level = scenario.trigger.level(fine)
+    parts = [
+        np.abs(arc.at(f"{agent_name(i)}.broadcast", fine) - arc.at(f"{agent_name(i)}.x", fine)) / level
+        for i in range(1, n + 1)
+    ]
+    cells = np.array(parts)[:, :-1].reshape(n, 800, 4).max(axis=2)
+    figure, ax = plt.subplots(figsize=(1.5 * COLUMN[0], height_of(n)), layout="constrained")
+    image = ax.pcolormesh(grid, np.arange(n + 1) + 0.5, cells, cmap="cividis", vmin=0.0, vmax=1.0, rasterized=True)
+    ax.set_ylim(n + 0.5, 0.5)
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
+    ax.set_ylabel("agent")
+    over_time(ax, scenario)
+    figure.colorbar(image, ax=ax, label=r"$|\hat{x}_i - x_i|$ over the threshold", aspect=30)
     return figure
 
 
@@ -140,10 +168,13 @@ def plot_gaps_against_bounds(
     ax = new_axes(ax)
     rows = {agent_name(i): np.asarray(times, dtype=float) for i, times in enumerate(event_times, start=1)}
     plot_inter_event_times(rows, ax=ax, markersize=3)
-    for line, k in zip(list(ax.lines), range(len(rows)), strict=False):
-        line.set_label(f"agent {k + 1}")
-        line.set_color(COLORS[k % len(COLORS)])
-        line.set_clip_on(False)
+    few = len(rows) <= LEGEND_ROWS
+    for line, k in zip(
+        [line for line in ax.lines if line.get_transform() == ax.transData], range(len(rows)), strict=False
+    ):
+        line.set(label=f"agent {k + 1}" if few else "_", color=COLORS[k % len(COLORS)], clip_on=False)
+    if not few:
+        ax.plot([], [], color="0.3", marker="o", markersize=3, linestyle="none", label=f"{len(rows)} agents")
     smallest = gap_statistics(event_times).min
     lowest = smallest if smallest is not None else 1.0
     for (name, bound), style in zip(bounds.items(), _cycled(len(bounds)), strict=True):

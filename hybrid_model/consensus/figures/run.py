@@ -10,25 +10,36 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from hybrid_model.consensus.certificates.certify import Certificates
+from hybrid_model.consensus.certificates.forms import Form, Quantity
 from hybrid_model.consensus.certificates.tree_bound import ConvergenceBound
 from hybrid_model.consensus.figures.style import (
     DASHES,
     FORMS,
     MARKER,
     agent_color,
+    agent_look,
+    agent_mark,
     in_column,
     legend_above,
     over_time,
+    row_step,
     save_figures,
 )
 from hybrid_model.consensus.laws.closed_loop import agent_name
 from hybrid_model.consensus.runs.report import edge_norm
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import Trigger
+from hybrid_model.declare.variables import FloatArray
 from hybrid_model.plots import COLORS, curve, new_axes, plot_raster
 from hybrid_model.record.arc import HybridArc
 
 __all__ = ["plot_broadcasts", "plot_edge_norm", "plot_error_against_threshold", "plot_states", "save_paper_figures"]
+
+
+FAR = 100.0
+"""A bound that is always so many times the largest value of the run says nothing in a figure."""
+_EDGE_LINES = {Form.EXACT: DASHES[2], Form.ENERGY: DASHES[1]}
 
 
 def plot_states(scenario: Scenario, arc: HybridArc, ax: Axes | None = None) -> Axes:
@@ -46,24 +57,35 @@ def plot_states(scenario: Scenario, arc: HybridArc, ax: Axes | None = None) -> A
     ax = new_axes(ax)
     n = scenario.network.agents
     for i in range(1, n + 1):
-        name, color = agent_name(i), agent_color(i)
+        name = agent_name(i)
         # With more agents than colours a legend could not tell them apart.
-        ax.plot(*curve(arc, f"{name}.x"), color=color, label=f"$x_{{{i}}}$" if n <= len(COLORS) else None)
+        label, width = (f"$x_{{{i}}}$", 1.0) if n <= len(COLORS) else (None, 0.6)
+        ax.plot(*curve(arc, f"{name}.x"), **agent_look(i), linewidth=width, label=label)
         times = arc.event_times(f"{name}.trigger.broadcast")
         if times.size:  # an empty line counts as a point in the corner when figures are cropped
-            ax.plot(times, arc.at(f"{name}.x", times), color=color, clip_on=False, **MARKER)
+            ax.plot(times, arc.at(f"{name}.x", times), clip_on=False, **agent_mark(i, n))
     mean = float(np.mean(scenario.network.initial))
     ax.axhline(mean, color="0.5", linewidth=0.6, linestyle=(0, (4, 3)), zorder=0, label="mean")
     ax.set_ylabel("states $x_i$")
     over_time(ax, scenario)
-    legend_above(ax, [Line2D([], [], color="0.3", label="broadcast", **MARKER)])
+    many = [Line2D([], [], color="0.3", label=f"{n} agents")] if n > len(COLORS) else []
+    legend_above(ax, [*many, Line2D([], [], color="0.3", label="broadcast", **MARKER)], handlelength=2.0)
     return ax
 
 
 def plot_edge_norm(
-    scenario: Scenario, arc: HybridArc, bounds: Sequence[ConvergenceBound] = (), ax: Axes | None = None
+    scenario: Scenario,
+    arc: HybridArc,
+    bounds: Sequence[ConvergenceBound] = (),
+    ax: Axes | None = None,
+    *,
+    found: Certificates | None = None,
 ) -> Axes:
     """Draw the norm of the edge states with its bounds, on a logarithmic axis (paper, figures 4 and 6).
+
+    Of what is certified these are drawn: what a start leaves, ``m exp(-rate t) ||x_e(0)||`` with Floquet's rate and its
+    factor m, plus what errors do from then on, the exact radius or that by energy, with the decay of the threshold
+    (docs/paper-audit.md, sections 5.3 and 7). Bounds along a tree that lie far above the run are words in the legend.
 
     Parameters
     ----------
@@ -75,23 +97,63 @@ def plot_edge_norm(
         The legend says which of them do not hold for the scenario; their notes say why.
     ax : Axes, optional
         Where to draw.
+    found : Certificates, optional
+        Of the scenario.
     """
     ax = new_axes(ax)
     times, first = curve(arc, f"{agent_name(1)}.x")
     others = [curve(arc, f"{agent_name(i)}.x")[1] for i in range(2, scenario.network.agents + 1)]
-    ax.semilogy(times, edge_norm(scenario, np.array([first, *others])), color="k", label=r"$\|x_e(t)\|$")
+    norm = edge_norm(scenario, np.array([first, *others]))
+    ax.semilogy(times, norm, color="k", label=r"$\|x_e(t)\|$")
     grid = np.linspace(0.0, scenario.stop_time, 300)
     missing = []
+    curves = certified_curves(found, float(norm[0]), grid)
+    if found is not None and not curves:
+        missing.append(Line2D([], [], linestyle="none", label="no exact bound"))
+    for form, values in curves.items():
+        ax.semilogy(grid, values, color=FORMS[form]["color"], linestyle=_EDGE_LINES[form], label=f"{form} bound")
     for bound in bounds:
         look = {key: FORMS[bound.form.value][key] for key in ("color", "linestyle")}
         if bound.kappa2 is None:
             missing.append(Line2D([], [], linestyle="none", label=f"no {bound.form.value} bound"))
+        elif found is not None and bound.at(grid).min() > FAR * norm.max():
+            power = int(np.log10(bound.at(grid).min()))
+            missing.append(Line2D([], [], linestyle="none", label=rf"{bound.form.value} bound $> 10^{{{power}}}$"))
         else:
             ax.semilogy(grid, bound.at(grid), **look, label=f"{bound.form.value} bound")
     ax.set_ylabel(r"norm of edge states $\|x_e\|$")
     over_time(ax, scenario)
     legend_above(ax, missing)
     return ax
+
+
+def certified_curves(found: Certificates | None, start: float, t: FloatArray) -> dict[Form, FloatArray]:
+    """Return the bounds on ``||x_e(t)||`` that hold from the start on, by the form of their radius.
+
+    Parameters
+    ----------
+    found : Certificates, optional
+        Of a scenario; without one, or where it lacks a number, there is no bound.
+    start : float
+        ``||x_e(0)||``.
+    t : array, shape (n,)
+        Times in s.
+
+    Returns
+    -------
+    dict of Form to array, shape (n,)
+        By superposition: what the start leaves, and what the errors do.
+    """
+    if found is None:
+        return {}
+    rate, factor = (found.value(quantity, Form.FLOQUET) for quantity in (Quantity.RATE, Quantity.TRANSIENT))
+    if rate is None or factor is None:
+        return {}
+    trigger = found.scenario.trigger
+    decay = 0.0 if trigger.offset > 0.0 else trigger.decay
+    radii = {form: found.value(Quantity.RADIUS, form) for form in (Form.EXACT, Form.ENERGY)}
+    left = factor * start * np.exp(-rate * t)
+    return {form: left + radius * np.exp(-decay * t) for form, radius in radii.items() if radius is not None}
 
 
 def plot_error_against_threshold(scenario: Scenario, arc: HybridArc, agent: int, ax: Axes | None = None) -> Axes:
@@ -164,10 +226,17 @@ def plot_broadcasts(scenario: Scenario, event_times: Sequence[npt.ArrayLike], ax
             "give one row an agent."
         )
     rows = {f"agent {i}": np.asarray(times, dtype=float) for i, times in enumerate(event_times, start=1)}
+    ax = new_axes(ax)
+    ax.set_xlim(0.0, scenario.stop_time)
     ax = plot_raster(rows, ax=ax)
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    step = row_step(len(rows), 0.8 * figure.get_size_inches()[1])
+    ax.set_yticks(range(0, len(rows), step), list(rows)[::step])
     for i, (collection, times) in enumerate(zip(ax.collections, rows.values(), strict=True), start=1):
         collection.set_color(agent_color(i))
-        ax.text(1.02, i - 1, f"{len(times)}", transform=ax.get_yaxis_transform(), va="center", fontsize="small")
+        if (i - 1) % step == 0:
+            ax.text(1.02, i - 1, f"{len(times)}", transform=ax.get_yaxis_transform(), va="center", fontsize="small")
     ax.text(1.06, 1.0, "broadcasts", transform=ax.transAxes, ha="right", va="bottom", fontsize="small")
     ax.set_ylim(len(rows) - 0.4, -0.6)
     ax.tick_params(axis="y", length=0)
@@ -177,18 +246,26 @@ def plot_broadcasts(scenario: Scenario, event_times: Sequence[npt.ArrayLike], ax
 
 
 def save_paper_figures(
-    kind: str, scenario: Scenario, arc: HybridArc, bounds: Sequence[ConvergenceBound], folder: Path
+    kind: str,
+    scenario: Scenario,
+    arc: HybridArc,
+    bounds: Sequence[ConvergenceBound],
+    folder: Path,
+    found: Certificates | None = None,
+    formats: Sequence[str] = ("png", "pdf"),
 ) -> list[Path]:
-    """Write the two figures of one trigger as PNG and PDF.
+    """Write the two figures of one trigger.
 
     Parameters
     ----------
     kind : str
         Name of the trigger, for the file names.
-    scenario, arc, bounds
+    scenario, arc, bounds, found
         As in `plot_edge_norm`.
     folder : Path
         Where to write.
+    formats : sequence of str
+        Out of png, pdf, svg, pgf.
 
     Returns
     -------
@@ -197,6 +274,6 @@ def save_paper_figures(
     """
     figures = {
         f"{kind}_states": in_column(lambda ax: plot_states(scenario, arc, ax)),
-        f"{kind}_edge_norm": in_column(lambda ax: plot_edge_norm(scenario, arc, bounds, ax)),
+        f"{kind}_edge_norm": in_column(lambda ax: plot_edge_norm(scenario, arc, bounds, ax, found=found), 1.25),
     }
-    return save_figures(figures, folder)
+    return save_figures(figures, folder, formats)

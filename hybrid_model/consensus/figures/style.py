@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,27 +15,51 @@ from matplotlib.lines import Line2D
 
 from hybrid_model.consensus.certificates.forms import Form
 from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.errors import DataError
 from hybrid_model.plots import COLORS, JOURNAL
 
 __all__ = [
     "COLUMN",
     "DASHES",
+    "FORMATS",
     "FORMS",
+    "LINES",
     "MARKER",
+    "PAGE",
     "VIOLATED",
     "agent_color",
+    "agent_look",
+    "agent_mark",
+    "height_of",
     "in_column",
     "legend_above",
     "over_time",
+    "require_formats",
+    "row_step",
     "save_figures",
 ]
 
 COLUMN = (3.4, 2.5)
 """Width and height in inches of a figure in one column of a journal."""
+PAGE = (7.0, 9.0)
+"""Width and height in inches that a figure has at most: a page."""
+ROW = 8.5
+"""Height in points that a name needs."""
 MARKER: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.2}
 """A broadcast in a figure over time."""
 DASHES: tuple[Any, ...] = ((0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), "solid", (0, (3, 1, 1, 1, 1, 1)))
 """Line styles of bounds, so that they can be told apart without colour as well."""
+FORMATS: dict[str, dict[str, None]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+    "svg": {"Date": None},
+    "pgf": {},
+}
+"""Forms of figures -> what is not written into them, so that one run gives the same files each time."""
+LINES: tuple[Any, ...] = ("solid", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
+"""Line styles of agents, one after the other."""
+MARKS = "osD^v<>X"
+"""Marks of agents, as many as there are colours."""
 VIOLATED = COLORS[1]
 """Colour of a bound that does not hold."""
 
@@ -53,6 +78,32 @@ FORMS: dict[str, dict[str, Any]] = {
 def agent_color(agent: int) -> str:
     """The colour of an agent, counted from 1."""
     return COLORS[(agent - 1) % len(COLORS)]
+
+
+def agent_look(agent: int) -> dict[str, Any]:
+    """The colour and the line of an agent, counted from 1: agents next to each other differ in both."""
+    return {"color": agent_color(agent), "linestyle": LINES[(agent - 1) % len(LINES)]}
+
+
+def agent_mark(agent: int, agents: int) -> dict[str, Any]:
+    """The mark of an agent's broadcasts; of many agents dots, which take the least room."""
+    few = agents <= len(COLORS)
+    size = 2.2 if agent == 1 else 2.8
+    return (
+        MARKER
+        | {"color": agent_color(agent)}
+        | ({"marker": MARKS[agent - 1], "markersize": size} if few else {"markersize": 1.2})
+    )
+
+
+def row_step(agents: int, height: float) -> int:
+    """Every how many rows a name has room, of so many rows in a height in inches."""
+    return next(k for k in (1, 2, 5, 10, 20, 50, 100, agents + 1) if k * height * 72.0 >= ROW * agents)
+
+
+def height_of(agents: int) -> float:
+    """Height in inches of a figure with a row for each agent: no higher than a page."""
+    return min(max(COLUMN[1], 0.9 + 0.16 * agents), PAGE[1])
 
 
 def over_time(ax: Axes, scenario: Scenario) -> None:
@@ -77,19 +128,38 @@ def legend_above(ax: Axes, words: Sequence[Line2D] = (), handlelength: float = 1
         )
 
 
-def in_column(plot: Callable[[Axes], object], columns: float = 1.0) -> Callable[[], Figure]:
-    """What draws a figure so many columns wide with one pair of axes, on which `plot` draws."""
+def in_column(plot: Callable[[Axes], object], columns: float = 1.0, height: float = COLUMN[1]) -> Callable[[], Figure]:
+    """What draws a figure with one pair of axes, on which `plot` draws; its width in columns, its height in inches."""
 
     def draw() -> Figure:
-        figure, ax = plt.subplots(figsize=(columns * COLUMN[0], COLUMN[1]))
+        figure, ax = plt.subplots(figsize=(columns * COLUMN[0], height))
         plot(ax)
         return figure
 
     return draw
 
 
-def save_figures(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> list[Path]:
-    """Write figures in a journal's style as PNG and PDF.
+def require_formats(formats: Sequence[str]) -> None:
+    """Refuse forms of figures that cannot be written here.
+
+    Raises
+    ------
+    DataError
+        For an unknown one, and for PGF where there is no TeX, which measures its texts.
+    """
+    for name in formats:
+        if name not in FORMATS:
+            raise DataError(f"figures are written as {', '.join(FORMATS)}, and not as {name!r}: give one of these.")
+    if "pgf" in formats and not any(map(shutil.which, ("xelatex", "pdflatex", "lualatex"))):
+        raise DataError(
+            "a figure as PGF needs TeX, and there is no xelatex, pdflatex or lualatex: install one, or leave pgf out."
+        )
+
+
+def save_figures(
+    figures: Mapping[str, Callable[[], Figure]], folder: Path, formats: Sequence[str] = ("png", "pdf")
+) -> list[Path]:
+    """Write figures in a journal's style.
 
     Parameters
     ----------
@@ -97,25 +167,34 @@ def save_figures(figures: Mapping[str, Callable[[], Figure]], folder: Path) -> l
         Name of the file -> what draws the figure.
     folder : Path
         Where to write.
+    formats : sequence of str
+        Out of `FORMATS`.
 
     Returns
     -------
     list of Path
         The files written.
+
+    Raises
+    ------
+    DataError
+        See `require_formats`.
     """
+    require_formats(formats)
     folder.mkdir(parents=True, exist_ok=True)
     # The font's own time stamp is none of the reader's business; the subsetter warns about it for every figure.
     logging.getLogger("fontTools").setLevel(logging.ERROR)
     written: list[Path] = []
-    with plt.rc_context(JOURNAL):
+    tex = next((name for name in ("xelatex", "pdflatex", "lualatex") if shutil.which(name)), "xelatex")
+    with plt.rc_context({**JOURNAL, "pgf.texsystem": tex}):
         for name, draw in figures.items():
-            written += _save(draw(), folder / name)
+            written += _save(draw(), folder / name, formats)
     return written
 
 
-def _save(figure: Figure, path: Path) -> list[Path]:
-    """Write a figure under a name without suffix, and close it; it is laid out once for both files."""
-    written = [path.with_name(f"{path.name}{suffix}") for suffix in (".png", ".pdf")]
+def _save(figure: Figure, path: Path, formats: Sequence[str]) -> list[Path]:
+    """Write a figure under a name without suffix, and close it; it is laid out once for all files."""
+    written = [path.with_name(f"{path.name}.{name}") for name in formats]
     # `savefig` draws a figure that has an engine once more, only to lay it out.
     with plt.rc_context({"figure.constrained_layout.use": False}):
         engine = figure.get_layout_engine()
@@ -123,7 +202,7 @@ def _save(figure: Figure, path: Path) -> list[Path]:
             figure.set_dpi(plt.rcParams["savefig.dpi"])
             engine.execute(figure)
             figure.set_layout_engine(None)
-        for file, metadata in zip(written, ({"Software": None}, {"CreationDate": None}), strict=True):
-            figure.savefig(file, metadata=metadata)
+        for file, name in zip(written, formats, strict=True):
+            figure.savefig(file, metadata=FORMATS[name])
     plt.close(figure)
     return written

@@ -52,8 +52,11 @@ def test_conservatism_is_a_factor_and_violations_are_named(ax):
     texts = [text.get_text() for text in ax.texts]
     # An upper bound of half the reference and a lower bound of five times it do not hold.
     assert texts == ["10", "0.5, violated", "10", "0.2, violated", "none"]
-    dots = [float(found.get_xdata()[0]) for found in ax.lines if found.get_marker() == "o"]
+    dots = [float(found.get_xdata()[0]) for found in ax.lines if found.get_marker() in "ox"]
     np.testing.assert_allclose(dots, [10.0, 0.5, 10.0, 0.2])
+    # What does not hold is a cross.
+    crosses = [float(found.get_xdata()[0]) for found in ax.lines if found.get_marker() == "x"]
+    np.testing.assert_allclose(crosses, [0.5, 0.2])
     ax.figure.canvas.draw()
     label = ax.xaxis.label.get_window_extent()
     assert ax.figure.bbox.x0 <= label.x0 <= label.x1 <= ax.figure.bbox.x1

@@ -63,8 +63,11 @@ def test_states_start_at_the_initial_values_and_carry_one_dot_a_broadcast(run, a
     plot_states(scenario, arc, ax)
     starts = [line(ax, f"$x_{{{i}}}$").get_data()[1][0] for i in (1, 2, 3, 4)]
     assert starts == list(scenario.network.initial)
-    dots = [line for line in ax.lines if line.get_marker() == "o"]
-    assert sum(len(line.get_xdata()) for line in dots) == sum(run_report(scenario, arc).events_per_agent)
+    dots = [drawn for drawn in ax.lines if drawn.get_marker() in "osD^"]
+    # Agents are told apart without colour: by their lines and by their marks.
+    assert len({drawn.get_marker() for drawn in dots}) == len(dots)
+    assert len({str(line(ax, f"$x_{{{i}}}$")._dash_pattern) for i in (1, 2, 3, 4)}) == 4
+    assert sum(len(drawn.get_xdata()) for drawn in dots) == sum(run_report(scenario, arc).events_per_agent)
 
 
 def test_many_agents_have_no_legend_of_colours_that_repeat(ax):
@@ -85,7 +88,7 @@ def test_many_agents_have_no_legend_of_colours_that_repeat(ax):
         switching=type(scenario.switching)(1.0, (tuple(range(1, n)),), n - 1),
     )
     plot_states(many, hm.simulate(closed_loop(many), many.stop_time), ax)
-    assert labels(ax) == ["mean", "broadcast"]
+    assert labels(ax) == ["mean", f"{n} agents", "broadcast"]
 
 
 def test_error_stays_below_the_threshold_and_reaches_it_at_each_broadcast(run, ax):
