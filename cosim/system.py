@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -85,6 +86,13 @@ class System:
         self._from: dict[str, list[Connection]] = {name: [] for name in self.slaves}
         for connection in self.connections:
             self._from[connection.source].append(connection)
+
+    def with_slaves(self, others: Mapping[str, Slave]) -> System:
+        """Return the system with others in the place of slaves, by name, that have the same variables."""
+        made = copy.copy(self)
+        made.slaves = {name: others.get(name, slave) for name, slave in self.slaves.items()}
+        made._outputs = {name: (made.slaves[slave.name], port) for name, (slave, port) in self._outputs.items()}
+        return made
 
     @property
     def most_rounds(self) -> int:

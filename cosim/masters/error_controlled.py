@@ -14,6 +14,7 @@ from cosim.masters.event_iteration import iterate_events
 from cosim.masters.macro_step import MacroSteps, Outcome
 from cosim.masters.start import MOST_STEPS, outputs, require_times, sample_change, sample_end, start_slaves
 from cosim.masters.treatments import with_rollback
+from cosim.replayed_slave import ReplayedSlave
 from cosim.result import CosimResult, Watch
 from cosim.system import System
 from hybrid_model.declare.variables import FloatArray
@@ -57,8 +58,9 @@ def run_error_controlled(
     Parameters
     ----------
     system : System
-        Slaves that can save and restore their state (canGetAndSetFMUState) and take steps of any length. Those with
-        event mode stop at their events; of others an event is seen by what it changes, and enclosed alike.
+        Slaves that take steps of any length. Those that cannot save and restore their state (canGetAndSetFMUState)
+        return to an earlier one by making their run again from the start. Those with event mode stop at their events;
+        of others an event is seen by what it changes, and enclosed alike.
     t_stop, t_start : float
         Times in s.
     tolerance : float
@@ -80,14 +82,14 @@ def run_error_controlled(
     Raises
     ------
     MisfitError
-        If a slave can neither return to an earlier state nor take steps of any length.
+        If a slave takes steps of one length only.
     CosimError
         If a slave fails, gets no further, or the signals between slaves form a loop without a state.
     """
     require_times(t_start, t_stop, output_interval, "output interval")
     if not 0.0 < tolerance < 1.0:
         raise CosimError(f"the tolerance is {tolerance}: give a number between 0 and 1, such as 1e-9.")
-    _require_rollback(system)
+    system = _with_rollback(system)
     changes = Changes(system, inputs or {}, t_start)
     result = CosimResult(t=t_start, watch=watch)
     try:
@@ -113,18 +115,14 @@ def run_error_controlled(
     return result
 
 
-def _require_rollback(system: System) -> None:
-    for slave in system.slaves.values():
-        if not slave.can_restore:
-            raise MisfitError(
-                f"{slave.name} cannot return to an earlier state (canGetAndSetFMUState is false), as error control "
-                "needs it: use the fixed-step master."
-            )
-        if not slave.variable_step:
-            raise MisfitError(
-                f"{slave.name} takes steps of one length only (canHandleVariableCommunicationStepSize is false): use "
-                "the fixed-step master."
-            )
+def _with_rollback(system: System) -> System:
+    rigid = next((slave for slave in system.slaves.values() if not slave.variable_step), None)
+    if rigid is not None:
+        raise MisfitError(
+            f"{rigid.name} takes steps of one length only (canHandleVariableCommunicationStepSize is false): use the "
+            "fixed-step master."
+        )
+    return system.with_slaves({n: ReplayedSlave(s) for n, s in system.slaves.items() if not s.can_restore})
 
 
 class _Run:
@@ -151,7 +149,9 @@ class _Run:
         self._until, self._quiet = math.inf, _QUIET
         self.ended: tuple[str, float, Termination] | None = None
         self.macro: MacroSteps
-        result.treatment = {slave.name: with_rollback(slave) for slave in system.slaves.values()}
+        result.treatment = {
+            name: with_rollback(slave, again=isinstance(slave, ReplayedSlave)) for name, slave in system.slaves.items()
+        }
 
     def begin(self) -> None:
         """Handle the events of the start."""

@@ -6,6 +6,7 @@ import pytest
 import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.cli.main import main
+from cosim.errors import CosimError
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_error_controlled, run_event_exact
 from cosim.system import System
@@ -76,3 +77,23 @@ def test_the_command_meets_fmi2_at_its_events(exported, tmp_path, capsys):
     )
     assert main(["cosim", str(tmp_path)]) == 0
     assert "b: 9 events at 1.87324039, 3.78459902" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("events", [True, False])
+def test_what_cannot_save_its_state_is_run_again_up_to_where_it_is_to_return(events, stranger, monkeypatch):
+    """A stranger that sends at 0.5, 1, 1.5 s, with event mode or without, to another one that cannot go back either."""
+    path = stranger(states=False, events=events)
+
+    def run():
+        slaves = [FmuSlave("a", path), FmuSlave("b", path)]
+        slaves[0].set("rate", 2.0)
+        return run_error_controlled(System(slaves, {"b.int32_in": "a.count"}), 1.6, output_interval=0.4)
+
+    result = run()
+    assert "goes back by a new run" in result.treatment["a"]
+    np.testing.assert_allclose(result.event_times("a"), [0.5, 1.0, 1.5], atol=1e-9, rtol=0)
+    assert result.final["b.int32_out"] == 3
+    assert result.final["a.x"] == pytest.approx(0.2)
+    monkeypatch.setattr("cosim.replayed_slave.MOST_REPEATED", 3)
+    with pytest.raises(CosimError, match=r"cannot save its state, and .* use the fixed-step master"):
+        run()
