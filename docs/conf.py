@@ -18,6 +18,7 @@ extensions = [
     "matplotlib.sphinxext.plot_directive",
     "site_parts.command_help",
     "site_parts.mathml",
+    "site_parts.model_entry",
     "site_parts.page_links",
     "site_parts.public_names",
 ]
@@ -32,6 +33,14 @@ default_role = "py:obj"
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"  # numpydoc sections have them in words
 
+plot_pre_code = """
+import matplotlib.pyplot as plt
+import numpy as np
+import hybrid_model as hm
+from hybrid_model import plots
+from hybrid_model.models import *
+"""
+plot_include_source = True
 plot_html_show_formats = False
 plot_html_show_source_link = False
 plot_formats = [("png", 120)]

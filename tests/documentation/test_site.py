@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from hybrid_model import models
+
 DOCS = Path(__file__).parents[2] / "docs"
-PAGES = sorted(page.relative_to(DOCS).with_suffix("") for page in DOCS.rglob("*.md"))
+PAGES = sorted(page.relative_to(DOCS).with_suffix("") for end in ("md", "rst") for page in DOCS.rglob(f"*.{end}"))
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +27,14 @@ def test_every_page_is_in_the_table_of_contents(site):
     contents = (site / "index.html").read_text(encoding="utf-8")
     wanted = {f"{page.as_posix()}.html" for page in PAGES if page.name != "index"}
     assert wanted - set(re.findall(r'class="reference internal" href="([^"#]+)"', contents)) == set()
+
+
+def test_the_gallery_has_every_model_and_the_file_that_it_is_in():
+    text = (DOCS / "gallery.rst").read_text(encoding="utf-8")
+    entries = re.findall(r"\.\. model:: (\w+)\n +:classes: (.+)\n", text)
+    shown = {name: file for file, names in entries for name in names.split()}
+    files = {name: getattr(models, name).__module__.rpartition(".")[2] for name in models.__all__}
+    assert shown == files
 
 
 def test_nothing_on_a_page_is_loaded_from_elsewhere(site):
