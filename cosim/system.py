@@ -48,6 +48,26 @@ class Connection:
         return f"{self.source}.{self.output} -> {self.target}.{self.input}"
 
 
+@dataclass(frozen=True)
+class Linear:
+    """An output of which ``factor * value + offset`` arrives, in the unit of the input.
+
+    Attributes
+    ----------
+    source : str
+        ``"slave.output"``.
+    factor, offset : float
+    """
+
+    source: str
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+Source = str | Sequence[str] | Linear
+"""What drives an input: an output, outputs for the elements of an array, or a scaled output."""
+
+
 class System:
     """Slaves and their connections.
 
@@ -57,7 +77,7 @@ class System:
         With distinct names; the order is the order in which simultaneous events are handled.
     connections : mapping
         ``"slave.input"`` -> ``"slave.output"``; for vectors too, if both have the same elements, or to a sequence of
-        names for the elements. Inputs not named keep their start values.
+        names for the elements; or to `Linear`, for numbers. Inputs not named keep their start values.
     loop_iterations : int
         How often signals that depend on each other at once, in a loop, are carried round it until they settle, beyond
         what a chain of all slaves needs. That solves loops whose gain is below one in size; 0: loops are refused.
@@ -69,18 +89,16 @@ class System:
         input, or text on an input for numbers.
     """
 
-    def __init__(
-        self, slaves: Sequence[Slave], connections: Mapping[str, str | Sequence[str]], *, loop_iterations: int = 0
-    ) -> None:
+    def __init__(self, slaves: Sequence[Slave], connections: Mapping[str, Source], *, loop_iterations: int = 0) -> None:
         self.loop_iterations = loop_iterations
         self.slaves = {slave.name: slave for slave in slaves}
         if len(self.slaves) < len(slaves):
             raise MisfitError(f"two slaves have one name among {[slave.name for slave in slaves]}: name them apart.")
         self._outputs = {f"{slave.name}.{port}": (slave, port) for slave in slaves for port in slave.outputs}
         self.connections = tuple(
-            self._connection(target, source)
-            for vector, sources in connections.items()
-            for target, source in self._elements(vector, sources)
+            self._connection(target, source, given)
+            for vector, given in connections.items()
+            for target, source in self._elements(vector, given.source if isinstance(given, Linear) else given)
         )
         self._refuse_doubles()
         self._from: dict[str, list[Connection]] = {name: [] for name in self.slaves}
@@ -218,7 +236,7 @@ class System:
             raise MisfitError(f"{name!r} is not an output; the outputs are {', '.join(self._outputs)}.")
         return self._outputs[name]
 
-    def _connection(self, target: str, source: str) -> Connection:
+    def _connection(self, target: str, source: str, given: Source) -> Connection:
         into, input_port = self._find(target, "input")
         out_of, output_port = self._find(source, "output")
         factor, offset = _conversion(source, output_port, target, input_port)
@@ -228,6 +246,10 @@ class System:
                 f"{source} changes along flows, but {target} is a discrete input, which may change only at events: "
                 "sample the signal first."
             )
+        if isinstance(given, Linear):
+            if output_port.kind != "number" or input_port.whole:
+                raise MisfitError(f"{source} -> {target} is scaled, and does not carry numbers with a fraction.")
+            factor, offset = given.factor * factor, given.factor * offset + given.offset
         return Connection(out_of.name, output_port.name, into.name, input_port.name, factor, offset)
 
     def _refuse_doubles(self) -> None:

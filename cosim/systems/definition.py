@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from cosim.system import Source
+
 FMU, AUTOMATON = "fmu", "automaton"
 
 
@@ -67,7 +69,7 @@ class SystemDefinition:
     components : sequence of Component
         Their order is that of simultaneous events.
     connections : mapping
-        ``"component.input"`` -> ``"component.output"``, or a sequence of those for the elements of an array.
+        As for `cosim.system.System`.
     inputs : Path, optional
         A table of inputs that nothing drives.
     experiment : Experiment
@@ -75,6 +77,6 @@ class SystemDefinition:
 
     name: str
     components: Sequence[Component]
-    connections: Mapping[str, str | Sequence[str]] = field(default_factory=dict)
+    connections: Mapping[str, Source] = field(default_factory=dict)
     inputs: Path | None = None
     experiment: Experiment = field(default_factory=Experiment)

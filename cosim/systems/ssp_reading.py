@@ -1,4 +1,4 @@
-"""Systems in SSP files, versions 1.0 and 2.0: one level of components that are FMUs."""
+"""Systems in SSP files, versions 1.0 and 2.0: components that are FMUs, in systems and systems in them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import MisfitError
+from cosim.system import Linear, Source
 from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
 from fmu.archives.checks import LIMITS
 from fmu.archives.reading import Archive, ArchiveError
@@ -15,6 +16,8 @@ from fmu.importer.temporary_folders import temporary_folder
 
 DESCRIPTION = "SystemStructure.ssd"
 VERSIONS = ("1.0", "2.0")
+Node = tuple[str, str]
+"""A connector: of a component, by its path, or of a system, by its path with a point behind."""
 _FMU_TYPES = (None, "application/x-fmu-sharedlibrary")
 _IMPLEMENTATIONS = {None: None, "any": None, "CoSimulation": "cs", "ModelExchange": "me"}
 
@@ -28,7 +31,7 @@ def read_ssp(path: str | Path) -> SystemDefinition:
     ------
     MisfitError
         If the archive or its XML must not be read, a component is missing, or the system needs what is not supported:
-        systems in systems, components that are no FMUs, signal dictionaries, transformations of signals.
+        components that are no FMUs, signal dictionaries, transformations that are not linear.
     """
     folder = temporary_folder()
     try:
@@ -50,6 +53,10 @@ class _Reading:
 
     def __init__(self, folder: Path, told: str) -> None:
         self._folder, self._told = folder.resolve(), told
+        self._elements: dict[str, Any] = {}
+        self._starts: dict[str, dict[str, Any]] = {}
+        self._given: dict[Node, Any] = {}
+        self._into: dict[Node, tuple[Node, float, float]] = {}
 
     def definition(self, path: Path) -> SystemDefinition:
         root = self._parsed(path)
@@ -59,14 +66,9 @@ class _Reading:
         system = next(iter(_children(root, "System")), None)
         if system is None:
             raise self._misfit(f"{DESCRIPTION} has no System")
-        elements = next(iter(_children(system, "Elements")), ())
-        for element in elements:
-            kind = _local(element)
-            if kind not in ("Component", "Annotations", ""):
-                raise self._misfit(f"it has a {kind} {element.get('name')!r}, and components alone are supported")
-        starts = {c.get("name"): self._parameters(c) for c in _children_of(elements, "Component")}
-        connections = self._connections(system, starts, self._parameters(system))
-        components = [self._component(c, starts[c.get("name")]) for c in _children_of(elements, "Component")]
+        self._read_system(system, "")
+        connections = self._connections()
+        components = [self._component(name, element) for name, element in self._elements.items()]
         if not components:
             raise self._misfit("it has no components")
         experiment = next(iter(_children(root, "DefaultExperiment")), None)
@@ -79,36 +81,69 @@ class _Reading:
             Experiment(start_time=times.get("startTime"), stop_time=times.get("stopTime")),
         )
 
-    def _component(self, element: Any, start: dict[str, Any]) -> Component:
-        name, source, kind = element.get("name"), element.get("source"), element.get("type")
+    def _read_system(self, system: Any, path: str) -> None:
+        """Note the components, wires and parameters of a system and of those in it; `path` is its name with a point."""
+        self._given |= {(path, name): value for name, value in self._parameters(system).items()}
+        paths = {None: path}
+        for element in next(iter(_children(system, "Elements")), ()):
+            name, kind = f"{path}{element.get('name')}", _local(element)
+            paths[element.get("name")] = f"{name}." if kind == "System" else name
+            if kind == "System":
+                self._read_system(element, f"{name}.")
+            elif kind == "Component":
+                self._elements[name], self._starts[name] = element, self._parameters(element)
+            elif kind not in ("Annotations", ""):
+                raise self._misfit(f"it has a {kind} {name!r}, and components and systems alone are supported")
+        for wire in _children_of(next(iter(_children(system, "Connections")), ()), "Connection"):
+            for name in (wire.get("startElement"), wire.get("endElement")):
+                if name not in paths:
+                    raise self._misfit(f"a connection names {name!r}, which is no component")
+            source = paths[wire.get("startElement")], wire.get("startConnector")
+            target = paths[wire.get("endElement")], wire.get("endConnector")
+            told = f"its connection {_told(source)} -> {_told(target)}"
+            if wire.get("suppressUnitConversion") == "true":
+                raise self._misfit(f"{told} suppresses the conversion of units, which is not supported")
+            if target in self._into:
+                raise self._misfit(f"{_told(target)} is connected twice")
+            self._into[target] = source, *self._scale(wire, told)
+
+    def _connections(self) -> dict[str, Source]:
+        """Follow the wires from each input through the borders of systems to an output, or to a parameter."""
+        connections: dict[str, Source] = {}
+        for target in self._into:
+            if target[0] not in self._elements:
+                continue
+            at, factor, offset = target, 1.0, 0.0
+            for _ in self._into:
+                if at not in self._into:
+                    break
+                at, by, plus = self._into[at]
+                factor, offset = factor * by, factor * plus + offset
+            if at[0] in self._elements:
+                scaled = (factor, offset) != (1.0, 0.0)
+                connections[_told(target)] = Linear(_told(at), factor, offset) if scaled else _told(at)
+            elif at in self._given:
+                self._starts[target[0]].setdefault(target[1], _scaled(self._given[at], factor, offset))
+        return connections
+
+    def _scale(self, element: Any, told: str) -> tuple[float, float]:
+        """Return factor and offset of an element with or without a transformation."""
+        found = [child for child in element if _local(child).endswith("Transformation")]
+        if not found:
+            return 1.0, 0.0
+        if _local(found[0]) != "LinearTransformation":
+            raise self._misfit(f"{told} has a {_local(found[0])}, and linear ones alone are supported")
+        return float(found[0].get("factor", "1")), float(found[0].get("offset", "0"))
+
+    def _component(self, name: str, element: Any) -> Component:
+        source, kind = element.get("source"), element.get("type")
         if kind not in _FMU_TYPES:
             raise self._misfit(f"its component {name} is of type {kind!r}, and FMUs alone are supported")
         implementation = element.get("implementation")
         if implementation not in _IMPLEMENTATIONS:
             raise self._misfit(f"its component {name} is for {implementation}, which no master runs")
-        return Component(
-            name, FMU, str(self._file(source, f"component {name}")), start, {}, _IMPLEMENTATIONS[implementation]
-        )
-
-    def _connections(self, system: Any, starts: dict[str, dict[str, Any]], given: dict[str, Any]) -> dict[str, str]:
-        connections: dict[str, str] = {}
-        for wire in _children_of(next(iter(_children(system, "Connections")), ()), "Connection"):
-            start, end = wire.get("startElement"), wire.get("endElement")
-            out, into = wire.get("startConnector"), wire.get("endConnector")
-            if any(_local(child).endswith("Transformation") for child in wire):
-                raise self._misfit(
-                    f"its connection {start}.{out} -> {end}.{into} is transformed, which is not supported"
-                )
-            for name in (start, end):
-                if name is not None and name not in starts:
-                    raise self._misfit(f"a connection names {name!r}, which is no component")
-            if start is not None and end is not None:
-                if f"{end}.{into}" in connections:
-                    raise self._misfit(f"{end}.{into} is connected twice")
-                connections[f"{end}.{into}"] = f"{start}.{out}"
-            elif end is not None and out in given:
-                starts[end].setdefault(into, given[out])
-        return connections
+        file, start = self._file(source, f"component {name}"), self._starts[name]
+        return Component(name, FMU, str(file), start, {}, _IMPLEMENTATIONS[implementation])
 
     def _parameters(self, element: Any) -> dict[str, Any]:
         values: dict[str, Any] = {}
@@ -121,7 +156,8 @@ class _Reading:
                 found = {name: value for one in inline for name, value in self._set(one).items()}
             mapping = self._mapping(binding)
             for name, value in found.items():
-                values[mapping.get(prefix + name, prefix + name)] = value
+                target, factor, offset = mapping.get(prefix + name, (prefix + name, 1.0, 0.0))
+                values[target] = _scaled(value, factor, offset)
         return values
 
     def _set(self, root: Any) -> dict[str, str]:
@@ -132,16 +168,15 @@ class _Reading:
                 values[parameter.get("name")] = typed.get("value")
         return values
 
-    def _mapping(self, binding: Any) -> dict[str, str]:
-        found: dict[str, str] = {}
+    def _mapping(self, binding: Any) -> dict[str, tuple[str, float, float]]:
+        found: dict[str, tuple[str, float, float]] = {}
         for element in _children(binding, "ParameterMapping"):
             source = element.get("source")
             inner = _children(element, "ParameterMapping") or [element]
             for root in [self._parsed(self._file(source, "a mapping"))] if source is not None else inner:
                 for entry in _children(root, "MappingEntry"):
-                    if len(entry):
-                        raise self._misfit(f"the mapping of {entry.get('source')} is transformed: not supported")
-                    found[entry.get("source")] = entry.get("target")
+                    told = f"the mapping of {entry.get('source')}"
+                    found[entry.get("source")] = entry.get("target"), *self._scale(entry, told)
         return found
 
     def _file(self, source: str | None, what: str) -> Path:
@@ -158,6 +193,14 @@ class _Reading:
 
     def _misfit(self, why: str) -> MisfitError:
         return MisfitError(f"{self._told} cannot be run: {why}.")
+
+
+def _told(node: Node) -> str:
+    return f"{node[0]}.{node[1]}" if node[0] and not node[0].endswith(".") else f"{node[0]}{node[1]}"
+
+
+def _scaled(value: Any, factor: float, offset: float) -> Any:
+    return value if (factor, offset) == (1.0, 0.0) else factor * float(value) + offset
 
 
 def _local(element: Any) -> str:

@@ -11,7 +11,7 @@ from lxml import etree
 
 from cosim.errors import MisfitError
 from cosim.slave import Port, Slave
-from cosim.system import System
+from cosim.system import Linear, System
 from cosim.systems.definition import FMU, SystemDefinition
 from cosim.systems.ssp_reading import DESCRIPTION, VERSIONS
 from fmu.archives.writing import package
@@ -82,6 +82,8 @@ def write_osp(definition: SystemDefinition, system: System, folder: str | Path, 
                 _add(initial, OSP, kind, value=_text(value))
     connections = _add(root, OSP, "Connections")
     for wire in system.connections:
+        if _linear(definition, f"{wire.target}.{wire.input}") is not None:
+            raise MisfitError(f"{wire} is scaled, which is not written for libcosim: scale in one of the FMUs.")
         element = _add(connections, OSP, "VariableConnection")
         _add(element, OSP, "Variable", simulator=wire.source, name=wire.output)
         _add(element, OSP, "Variable", simulator=wire.target, name=wire.input)
@@ -122,12 +124,21 @@ def _description(definition: SystemDefinition, system: System, version: str) -> 
         connections = _add(whole, SSD, "Connections")
         for wire in system.connections:
             ends = {"startElement": wire.source, "startConnector": wire.output}
-            _add(connections, SSD, "Connection", **ends, endElement=wire.target, endConnector=wire.input)
+            element = _add(connections, SSD, "Connection", **ends, endElement=wire.target, endConnector=wire.input)
+            linear = _linear(definition, f"{wire.target}.{wire.input}")
+            if linear is not None:
+                _add(element, SSC, "LinearTransformation", factor=repr(linear.factor), offset=repr(linear.offset))
     times = {"startTime": definition.experiment.start_time, "stopTime": definition.experiment.stop_time}
     given = {name: repr(value) for name, value in times.items() if value is not None}
     if given:
         _add(root, SSD, "DefaultExperiment", **given)
     return root
+
+
+def _linear(definition: SystemDefinition, target: str) -> Linear | None:
+    """Return how what an input is driven by is scaled; an element is as its array is."""
+    given = definition.connections.get(target, definition.connections.get(target.partition("[")[0]))
+    return given if isinstance(given, Linear) else None
 
 
 def _fmus(definition: SystemDefinition) -> Iterator[tuple[str, Path]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import MisfitError
+from cosim.system import Linear, Source
 from cosim.systems.definition import AUTOMATON, FMU, Component, Experiment, SystemDefinition
 
 _TABLES = ("name", "experiment", "components", "connections", "inputs")
@@ -41,13 +42,9 @@ def read_toml(path: str | Path) -> SystemDefinition:
     components = [_component(path, folder, name, entry) for name, entry in _table(path, document, "components").items()]
     if not components:
         raise MisfitError(f"{path} has no components: give [components.NAME] with fmu or automaton.")
-    connections = _table(path, document, "connections")
-    for target, source in connections.items():
-        if not isinstance(source, str) and not (isinstance(source, list) and all(isinstance(s, str) for s in source)):
-            raise MisfitError(
-                f"{path}: connections.{target!r} is {source!r}: give the name of an output, or a list of them. Names "
-                'with points are quoted: "b.u" = "a.y".'
-            )
+    connections = {
+        target: _source(path, target, source) for target, source in _table(path, document, "connections").items()
+    }
     inputs = _table(path, document, "inputs")
     _require_known(path, "inputs.", inputs, ("file",))
     return SystemDefinition(
@@ -64,6 +61,23 @@ def _document(path: str | Path) -> dict[str, Any]:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise MisfitError(f"{path} cannot be read as TOML: {error}") from error
+
+
+def _source(path: Path, target: str, given: Any) -> Source:
+    if isinstance(given, str) or (isinstance(given, list) and all(isinstance(s, str) for s in given)):
+        return given
+    numbers = {name: given[name] for name in ("factor", "offset") if name in given} if isinstance(given, dict) else {}
+    if (
+        isinstance(given, dict)
+        and isinstance(given.get("from"), str)
+        and len(given) == 1 + len(numbers)
+        and all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in numbers.values())
+    ):
+        return Linear(given["from"], **{name: float(value) for name, value in numbers.items()})
+    raise MisfitError(
+        f"{path}: connections.{target!r} is {given!r}: give the name of an output, a list of them, or "
+        '{ from = "a.y", factor = 2.0, offset = 0.0 }. Names with points are quoted: "b.u" = "a.y".'
+    )
 
 
 def _component(path: Path, folder: Path, name: str, entry: Any) -> Component:

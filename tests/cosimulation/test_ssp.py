@@ -6,11 +6,15 @@ from importlib import resources
 import pytest
 from lxml import etree
 
+import hybrid_model as hm
 from cosim.cli.main import main
 from cosim.errors import MisfitError
+from cosim.masters import run_fixed_step
+from cosim.system import Linear
 from cosim.systems.assembly import assemble
 from cosim.systems.files import read_system
 from cosim.systems.ssp_reading import read_ssp
+from cosim.systems.ssp_writing import write_osp, write_ssp
 
 SYSTEM = """
 name = "pair"
@@ -46,6 +50,28 @@ SSD = """<?xml version="1.0" encoding="UTF-8"?>
   <ssd:DefaultExperiment startTime="0" stopTime="1"/>
 </ssd:SystemStructureDescription>
 """
+WIRE = """<ssd:Connection xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" startElement="a"
+  startConnector="x" endElement="a" endConnector="heard">{}</ssd:Connection>"""
+INNER = """
+<ssd:System name="inner" xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon">
+  <ssd:Connectors>
+    <ssd:Connector name="in" kind="input"/><ssd:Connector name="out" kind="output"/>
+    <ssd:Connector name="speed" kind="parameter"/>
+  </ssd:Connectors>
+  <ssd:Elements><ssd:Component name="b" source="resources/stranger.fmu"/></ssd:Elements>
+  <ssd:Connections>
+    <ssd:Connection startConnector="in" endElement="b" endConnector="heard">
+      <ssc:LinearTransformation factor="2" offset="1"/></ssd:Connection>
+    <ssd:Connection startElement="b" startConnector="total" endConnector="out"/>
+    <ssd:Connection startConnector="speed" endElement="b" endConnector="rate"/>
+  </ssd:Connections>
+</ssd:System>"""
+ACROSS = """
+<ssd:Connection xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" startElement="a" startConnector="total"
+  endElement="inner" endConnector="in"><ssc:LinearTransformation factor="10"/></ssd:Connection>
+<ssd:Connection startElement="inner" startConnector="out" endElement="a" endConnector="heard"/>
+<ssd:Connection xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" startConnector="speed"
+  endElement="inner" endConnector="speed"><ssc:LinearTransformation offset="1"/></ssd:Connection>"""
 VALUES = """<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" version="1.0"
   name="x">
 <ssv:Parameters><ssv:Parameter name="{name}"><ssv:Real value="{value}"/></ssv:Parameter></ssv:Parameters>
@@ -53,6 +79,15 @@ VALUES = """<ssv:ParameterSet xmlns:ssv="http://ssp-standard.org/SSP1/SystemStru
 MAPPING = """<ssm:ParameterMapping xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
   version="1.0">
 <ssm:MappingEntry source="weight" target="weights[1]"/></ssm:ParameterMapping>"""
+
+
+class Gain(hm.HybridAutomaton):
+    u = hm.Input(5.0)
+    y = hm.Output()
+    k = hm.Parameter(1.0)
+
+    def outputs(self, s):
+        return {"y": s.k * s.u}
 
 
 @pytest.fixture
@@ -108,13 +143,41 @@ def test_parameters_come_from_files_by_mappings_and_from_the_system(by_hand):
     assert slave.inputs
 
 
+def test_systems_in_systems_are_followed_through_their_borders(by_hand):
+    """b hears 2 (10 total) + 1, and its rate is the system's speed, 2, and 1."""
+    definition = read_ssp(by_hand(more=INNER, wires=ACROSS))
+    assert definition.connections == {"inner.b.heard": Linear("a.total", 20.0, 1.0), "a.heard": "inner.b.total"}
+    assert definition.components[1].name == "inner.b"
+    assert definition.components[1].start == {"rate": 3.0}
+
+
+def test_signals_are_scaled_and_written_as_they_are(tmp_path, exported):
+    (tmp_path / "system.toml").write_text(
+        f'[experiment]\nstop_time = 1.0\n[components.a]\nfmu = "{exported(Gain(), "gain", "2.0")}"\n'
+        f'[components.b]\nfmu = "{exported(Gain(), "gain", "2.0")}"\nstart = {{ k = 3.0 }}\n'
+        '[connections]\n"b.u" = { from = "a.y", factor = 10.0, offset = 1.0 }\n'
+    )
+    path = tmp_path / "system.ssp"
+    definition = read_system(tmp_path / "system.toml")
+    write_ssp(definition, assemble(definition), path)
+    for given in (tmp_path, path):
+        # b's input is 10 * 5 + 1.
+        assert run_fixed_step(assemble(read_system(given)), 1.0, 0.5).final["b.y"] == pytest.approx(153.0)
+    with pytest.raises(MisfitError, match=r"a.y -> b.u is scaled, which is not written for libcosim"):
+        write_osp(definition, assemble(definition), tmp_path / "osp", 0.1)
+
+
 @pytest.mark.parametrize(
     ("told", "sentence"),
     [
         ({"source": False}, "component a is said to be in 'resources/stranger.fmu', which is no file in it"),
         ({"attributes": 'type="application/x-matlab"'}, "is of type 'application/x-matlab', and FMUs alone"),
         ({"attributes": 'implementation="ScheduledExecution"'}, "is for ScheduledExecution, which no master runs"),
-        ({"more": '<ssd:System name="inner"/>'}, "it has a System 'inner', and components alone"),
+        ({"more": '<ssd:SignalDictionaryReference name="bus"/>'}, "it has a SignalDictionaryReference 'bus'"),
+        (
+            {"wires": WIRE.format("<ssc:BooleanMappingTransformation/>")},
+            "BooleanMappingTransformation, and linear ones",
+        ),
         (
             {"wires": '<ssd:Connection startElement="z" startConnector="y" endElement="a" endConnector="heard"/>'},
             "a connection names 'z', which is no component",
