@@ -228,8 +228,8 @@ def test_only_a_record_bounds_the_number_of_jumps_of_a_run(exported):
     late = Catching(behind=0)
 
     class After(AutomatonSlave):
-        def start(self, t_start, t_stop, *, events):
-            super().start(t_start, t_stop, events=events)
+        def start(self, t_start, t_stop, **options):
+            super().start(t_start, t_stop, **options)
             self._running.run.j = hm.ZenoGuard().max_jumps
 
     assert hm.simulate(late, 5.5e-3, zeno=hm.ZenoGuard(max_jumps=3)).stop is hm.Stop.JUMPS

@@ -62,11 +62,11 @@ def cases():
     found |= weights_cases(Case)
     for kind in ("static", "dynamic"):
         scenario = replace_trigger(paper, kind)
-        found[f"paper_{kind}"] = Case(closed_loop(scenario), 20.0)
+        found[f"paper_{kind}"] = Case(closed_loop(scenario), 8.03)
         found[f"agent2_{kind}"] = Case(
             scenario_agents(scenario)["agent2"],
-            20.0,
-            {"neighbours[1]": ((2.0, 1.3), (7.5, 0.9)), "neighbours[2]": ((3.0, 0.6), (11.0, 1.0))},
+            9.07,
+            {"neighbours[1]": ((2.0, 1.3), (7.5, 0.9)), "neighbours[2]": ((3.0, 0.6), (6.0, 1.0))},
         )
     return MappingProxyType(found)
 

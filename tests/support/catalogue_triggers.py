@@ -66,7 +66,7 @@ def trigger_cases(case):
         found[f"ring_{name}"] = case(closed_loop(replace(ring, channel=channel)), 5.03)
     found["ring_agent1_loss"] = case(
         scenario_agents(replace(ring, channel=CHANNELS["loss"]))["agent1"],
-        5.03,
+        2.53,
         {
             "neighbours[1]": ((0.3, 0.1), (0.9, -0.2), (1.4, 0.3), (2.2, 0.1)),
             "sent[1]": ((0.3, 1.0), (0.9, 2.0), (1.4, 3.0), (2.2, 4.0)),

@@ -93,16 +93,16 @@ def weights_cases(make_case):
         ),
     }
     for name, weights in WEIGHTS.items():
-        found[f"ring_{name}"] = make_case(closed_loop(ring(weights=weights)), 12.0)
+        found[f"ring_{name}"] = make_case(closed_loop(ring(weights=weights)), 6.03)
     for name, switching in SWITCHING.items():
         scenario = ring(switching=switching)
-        found[f"ring_{name}"] = make_case(closed_loop(scenario), 12.0)
+        found[f"ring_{name}"] = make_case(closed_loop(scenario), 6.03)
     found["agent1_sampled"] = make_case(
         scenario_agents(ring(weights=WEIGHTS["sampled"], switching=SWITCHING["sequence"]))["agent1"],
         12.0,
         {"neighbours[1]": ((2.0, 1.3), (7.5, 0.9)), "neighbours[2]": ((3.0, 0.6), (11.0, 1.0))},
     )
-    found["moving_agents"] = make_case(closed_loop(moving_agents()), 12.0)
+    found["moving_agents"] = make_case(closed_loop(moving_agents()), 6.03)
     return found
 
 
