@@ -17,7 +17,7 @@ from hybrid_model.consensus.scenario.files import read_scenario
 
 ROOT = Path(__file__).parents[2]
 PAGES = [page for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))] if blocks(page)]
-LANGUAGES = {"python", "pycon", "sh", "toml"}
+LANGUAGES = {"c", "python", "pycon", "sh", "toml"}
 ANY_SCENARIO = {
     "name": "example",
     "stop_time": 10.0,

@@ -1,8 +1,9 @@
 """The code blocks of a page in Markdown, and what runs them: as a reader would, from top to bottom in one folder.
 
 A block's language says what it is. ``python`` runs in the names that the blocks before it have left; one that begins
-with ``# name.py`` is that file. ``pycon`` is a doctest, ``sh`` are commands, ``toml`` that begins with ``# name.toml``
-is that file, else tables of a scenario. ``text`` is no code. ``<!-- not run: why -->`` before a block leaves it out.
+with ``# name.py`` is that file, as one of ``c`` that begins with ``/* name.c */`` is. ``pycon`` is a doctest, ``sh``
+are commands, ``toml`` that begins with ``# name.toml`` is that file, else tables of a scenario. ``text`` is no code.
+``<!-- not run: why -->`` before a block leaves it out.
 """
 
 import doctest
@@ -16,7 +17,7 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 
 WHY = re.compile(r"<!-- not run: (.+) -->\s*")
-FILE = re.compile(r"# ([\w.-]+\.(?:py|toml|yaml|csv))\n")
+FILE = re.compile(r"(?:# |/\* )([\w.-]+\.(?:py|toml|yaml|csv|c))(?: \*/)?\n")
 
 
 @dataclass(frozen=True)
