@@ -15,6 +15,8 @@ from c_runs import (
     model_exchange,
     only,
     python_run,
+    sample,
+    watched,
 )
 from c_witnesses import POLYNOMIAL, WITNESSES
 from witnesses import Cascade, FlowFirst, Mix, Ramps, Timers
@@ -76,6 +78,65 @@ def check_co_simulation(start):
     for witness in [*WITNESSES.values(), *MORE.values()]:
         for fmi in VERSIONS:
             agree_in_all_ways(witness, start(witness.automaton, fmi), fmi)
+
+
+def state_of(instance):
+    """The bytes of the present state."""
+    instance.do("save", 0)
+    instance.do("bytes", 0)
+    return instance.harness.ask("showbytes")
+
+
+def check_networks(start):
+    """Parts run by themselves inside: events, announced times, views, saved states, and nothing changed by reading."""
+    witness = WITNESSES["network"]
+    for fmi in VERSIONS:
+        agree_in_all_ways(witness, start(witness.automaton, fmi), fmi)
+    harness = start(witness.automaton, "3.0")
+    instance, names = Instance(harness), watched(harness)
+    instance.boot(0.0, 1.1, **{"p1.push": 0.3})
+    _, announced = instance.iterate()
+    t, halved, saved = 0.0, [], None
+    while t < 1.1:
+        event, terminate, early, _ = instance.step(t, min(announced, 1.1) - t)
+        assert (terminate, early) == (False, False)
+        t = min(announced, 1.1)
+        assert event == (t < 1.1), "announced for an event, and none is there"
+        if not event:
+            break
+        instance.do("plain", "event")
+        before, shown = state_of(instance), sample(instance, names)
+        assert state_of(instance) == before
+        again, _, changed, time = instance.update()
+        if not again:
+            # A look far ahead has made other steps of the solver.
+            after = sample(instance, names)
+            np.testing.assert_allclose([*after.values()], [*shown.values()], rtol=0, atol=1e-12)
+        if changed:
+            halved.append(t)
+        while again:
+            again, _, changed, time = instance.update()
+            halved += [t] * changed
+        instance.do("plain", "step")
+        announced = time if time is not None else 1.1
+        if saved is None and t > 0.5:
+            saved = t, announced
+            instance.do("save", 1)
+            instance.do("bytes", 1)
+            instance.do("parse", 1)
+    # The only jumps that change a continuous state; four parts have them at once.
+    np.testing.assert_allclose(halved, [0.37] * 4 + [0.74] * 4, rtol=0, atol=1e-12)
+    final = instance.values()
+    instance.do("load", 1)
+    t, announced = saved
+    while t < 1.1:
+        event, *_ = instance.step(t, min(announced, 1.1) - t)
+        t = min(announced, 1.1)
+        if event:
+            instance.do("plain", "event")
+            _, announced = instance.iterate()
+            announced = 1.1 if announced is None else announced
+    assert instance.values() == final
 
 
 def check_exchange(start):

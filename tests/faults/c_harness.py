@@ -19,7 +19,7 @@ from fmu.describe.variable_table import fmu_variables
 from fmu.describe.variables import Fmi
 from hybrid_model import Automaton
 from hybrid_model.native.build.compiler import find_compiler
-from hybrid_model.native.trace import trace
+from hybrid_model.native.networks.network import trace_any
 
 HERE = Path(__file__).parent
 TOKEN = "0123456789abcdef0123456789abcdef"
@@ -44,7 +44,7 @@ class Fallen(AssertionError):
 @functools.lru_cache(maxsize=64)
 def generated(automaton: Automaton, fmi: str) -> tuple[str, tuple]:
     """The model's C code, and its variables in the order of their references."""
-    traced = trace(automaton)
+    traced = trace_any(automaton)
     variables = fmu_variables(traced, Fmi(fmi))
     return fmu_code(traced, variables, TOKEN, ("cs", "me")), variables
 

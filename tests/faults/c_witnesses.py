@@ -1,6 +1,7 @@
 """Models that the C harness is run with: together they use every part of the runtime."""
 
 from c_runs import Witness
+from parts_network import parts_network
 from witnesses import Cascade, FlowFirst, Hill, Mix, Ramps, Swing, Timers
 
 from hybrid_model.consensus.weights.gated_sine import GatedSineWeights
@@ -23,6 +24,8 @@ WITNESSES = {
     "flow_first": Witness(FlowFirst(rate=0.7), 5.0, 12),
     # Flows that have no closed form, a breakpoint, a tie of nothing.
     "mix": Witness(Mix(), 3.0, 31, changes=((0.77, "push", 0.2), (1.9, "push", -0.1))),
+    # Parts that meet only at events, run part by part, inputs from outside.
+    "network": Witness(parts_network(), 1.1, 7, changes=((0.31, "p1.push", 0.2), (0.62, "p4.push", -0.3))),
     # Breakpoints alone.
     "gated": Witness(GatedSineWeights(duty_percent=[20.0, 35.0]), 5.0, 37),
 }

@@ -167,8 +167,6 @@ void schedule_save(Schedule *schedule, void *bytes)
 {
     const Moment moment = {schedule->t, schedule->start, schedule->stop, schedule->queue.count,
                            schedule->pending.count, schedule->n_touched, schedule->running};
-    for (uint32_t i = 0; i < schedule->n_parts; i++)
-        engine_catch_up(schedule_at(schedule, i));
     schedule_let_go(schedule);
     memcpy(bytes, &moment, sizeof moment);
     memcpy((unsigned char *)bytes + moment_size(), schedule->memory, schedule->size);

@@ -138,11 +138,14 @@ static bool look_ahead(Schedule *schedule, uint32_t i, double steps, double *nex
 {
     Engine *engine = schedule_at(schedule, i);
     double few = engine->options.look_ahead_steps;
-    engine->options.look_ahead_steps = steps;
-    bool ahead = engine_look_ahead(engine, schedule->stop, next);
+    bool ahead;
+    do {
+        engine->options.look_ahead_steps = steps;
+        ahead = engine_look_ahead(engine, schedule->stop, next);
+        steps *= 8.0;
+    } while (!ahead && engine->status->prediction == PREDICTION_RENEWAL && steps < MOST_ITERATIONS);
     engine->options.look_ahead_steps = few;
-    bool none = !ahead && engine->status->prediction == PREDICTION_RENEWAL && steps < MOST_ITERATIONS;
-    return none ? look_ahead(schedule, i, 8.0 * steps, next) : ahead;
+    return ahead;
 }
 
 static void predict(Schedule *schedule, uint32_t i, double steps)

@@ -1,6 +1,5 @@
 /* A network from its start to its end: the next instant, and who has events there. */
 #include <math.h>
-#include <stdlib.h>
 
 #include "schedule.h"
 
@@ -103,12 +102,6 @@ bool schedule_begin(Schedule *schedule)
     return schedule_wake(schedule) && schedule_iterate(schedule, schedule->start);
 }
 
-static int by_order(const void *a, const void *b)
-{
-    uint32_t first = *(const uint32_t *)a, second = *(const uint32_t *)b;
-    return (first > second) - (first < second);
-}
-
 /* Looks further ahead from where a look ahead has ended; nobody else notices. */
 static bool look_further(Schedule *schedule, uint32_t i)
 {
@@ -156,7 +149,6 @@ bool schedule_next_instant(Schedule *schedule, double limit, double *instant)
         queue_remove(queue, i);
         schedule->due[schedule->n_due++] = i;
     }
-    qsort(schedule->due, schedule->n_due, sizeof(uint32_t), by_order);
     for (size_t k = 0; k < schedule->n_due; k++)
         if (schedule->parts[schedule->due[k]].t < *instant &&
             !schedule_step(schedule, schedule->due[k], *instant, &event))
