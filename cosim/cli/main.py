@@ -22,6 +22,7 @@ COMMANDS = {
     "export": ("export", "export an automaton or a scenario's agents as FMUs"),
     "cosim": ("cosimulate", "co-simulate a scenario's agents, or run one FMU"),
     "validate": ("validate", "check anybody's FMU"),
+    "app": ("app", "an interactive page with sliders, in a browser"),
     "doctor": ("doctor", "what this machine has: compilers, cache, extras, platforms"),
     "completion": ("completion", "completion of commands and options for a shell"),
 }

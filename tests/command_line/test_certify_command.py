@@ -94,7 +94,7 @@ def test_figures_are_written_with_the_certificates(scenario, tmp_path, capsys, c
     out = tmp_path / "found"
     assert main(["certify", scenario(**changes), "--json", "--max-jumps", "200", "--out", str(out)]) == 0
     assert json.loads((out / "certificates.json").read_text()) == json.loads(capsys.readouterr().out)
-    names = {"states", "broadcasts", "gaps", "errors", "conservatism"} - set(missing)
+    names = {"states", "edge_norm", "broadcasts", "gaps", "errors", "conservatism"} - set(missing)
     drawn = {path.stem for path in out.glob("*.png")}
     # Without a number to measure bounds by there is no conservatism to draw.
     assert names - {"conservatism"} <= drawn <= names

@@ -74,7 +74,10 @@ def test_examples_are_calls(command, monkeypatch):
 
 
 def test_json_everywhere():
-    assert [name for name, parser in GROUP.choices.items() if "--json" not in parser.format_help()] == ["completion"]
+    assert [name for name, parser in GROUP.choices.items() if "--json" not in parser.format_help()] == [
+        "app",
+        "completion",
+    ]
 
 
 def test_doctor_tells_what_there_is(capsys):

@@ -1,0 +1,113 @@
+"""What is built to be installed: complete, and it runs in an environment that has nothing else."""
+
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import tomllib
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("hybrid_model", "fmu", "cosim")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+
+
+def tracked():
+    """Files of the packages that are part of the project."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("needs the repository: git tells which files belong to it")
+    done = subprocess.run(["git", "ls-files", "-z", *PACKAGES], cwd=ROOT, capture_output=True, text=True, check=True)
+    return {name for name in done.stdout.split("\0") if name and (ROOT / name).is_file()}
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """The wheel and the sdist, by the build backend itself, in this environment."""
+    out = tmp_path_factory.mktemp("dist")
+    program = (
+        "import sys; from hatchling.build import build_sdist, build_wheel; "
+        "print(build_sdist(sys.argv[1])); print(build_wheel(sys.argv[1]))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(out)], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return [out / name for name in done.stdout.split()]
+
+
+def test_the_wheel_has_every_file_of_the_packages(built):
+    _, wheel = built
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        (entry_points,) = [name for name in names if name.endswith("entry_points.txt")]
+        assert "hybrid-fmu = cosim.cli.main:main" in archive.read(entry_points).decode()
+    assert tracked() - names == set()
+    assert {f"{package}/py.typed" for package in PACKAGES} <= names
+    assert not [name for name in names if name.split("/")[0] not in PACKAGES and ".dist-info/" not in name]
+
+
+def test_the_sdist_has_them_too_and_what_a_test_needs(built):
+    sdist, _ = built
+    with tarfile.open(sdist) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert tracked() - names == set()
+    assert {"Makefile", "constraints.txt", "tests/conftest.py", "LICENSE", "CITATION.cff"} <= names
+    assert not [name for name in names if name.startswith((".venv", "results", "dist/"))]
+
+
+def test_the_citation_has_the_version_of_the_package():
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    (version,) = re.findall(r"^version: (\S+)$", text, re.M)
+    assert f'__version__ = "{version}"' in (ROOT / "hybrid_model" / "__init__.py").read_text(encoding="utf-8")
+
+
+def test_the_conda_recipe_asks_for_what_the_wheel_asks_for():
+    text = (ROOT / "conda" / "recipe.yaml").read_text(encoding="utf-8")
+    asked = {re.split(r"[<>=; ]", line)[0]: line.replace(" ", "") for line in PROJECT["dependencies"]}
+    conda = {line.strip("- ").split(" ")[0]: line.strip("- ").replace(" ", "") for line in text.splitlines()}
+    for name, line in asked.items():
+        renamed = {"matplotlib": "matplotlib-base"}.get(name, name)
+        assert conda[renamed] == line.replace(name, renamed), name
+
+
+def run(python, *call, **more):
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("PYTHON")}
+    return subprocess.run(
+        [python, *call], capture_output=True, text=True, check=True, env=environment | more, timeout=900
+    )
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["wheel", "sdist"])
+def test_in_an_empty_environment_it_runs(kind, built, tmp_path):
+    sdist, wheel = built
+    venv.create(tmp_path / "env", with_pip=True)
+    python = tmp_path / "env" / "bin" / "python"
+    file = wheel if kind == "wheel" else sdist
+    run(python, "-m", "pip", "install", "-q", "-c", ROOT / "constraints.txt", file)
+    cache = {"HYBRID_FMU_CACHE": str(tmp_path / "cache")}
+    command = tmp_path / "env" / "bin" / "hybrid-fmu"
+    assert "native: its maps are compiled" in run(python, command, "doctor", **cache).stdout
+    # What it can do without extras, and the sentence where one is missing.
+    out = run(python, command, "export", "paper-a", "--out", tmp_path / "fmus", **cache).stdout.split()
+    assert len(out) == 4
+    assert "sound: 0 errors" in run(python, command, "validate", out[0], **cache).stdout.lower()
+    missing = subprocess.run([python, command, "app"], capture_output=True, text=True, check=False)
+    assert missing.returncode == 2
+    assert 'pip install "hybrid-fmu[app]"' in missing.stderr
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("extra", sorted(set(PROJECT["optional-dependencies"]) - {"dev", "interop", "mosaik"}))
+def test_each_extra_can_be_installed(extra, built, tmp_path):
+    """Those of other platforms' importers are installed with the extra dev, in which the tests run."""
+    venv.create(tmp_path / "env", with_pip=True)
+    python = tmp_path / "env" / "bin" / "python"
+    run(python, "-m", "pip", "install", "-q", "-c", ROOT / "constraints.txt", f"{built[1]}[{extra}]")
+    lines = run(python, tmp_path / "env" / "bin" / "hybrid-fmu", "doctor").stdout.splitlines()
+    (line,) = [line for line in lines if line.startswith(f"extra      {extra}:")]
+    assert "missing" not in line
