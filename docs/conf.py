@@ -17,7 +17,7 @@ extensions = [
     "numpydoc",
     "matplotlib.sphinxext.plot_directive",
     "site_parts.command_help",
-    "site_parts.mathml",
+    "site_parts.formulas",
     "site_parts.model_entry",
     "site_parts.page_links",
     "site_parts.public_names",
@@ -49,6 +49,6 @@ plot_apply_rcparams = True
 
 html_theme = "furo"
 html_title = "hybrid-fmu"
-html_math_renderer = "mathml"
+html_math_renderer = "drawings"
 html_show_sourcelink = False
 html_copy_source = False

@@ -1,4 +1,4 @@
-"""`certify`: every bound of a scenario in every form, with hypotheses, unit and source in paper or audit, and a run."""
+"""`certify`: every bound of a scenario in every form, with hypotheses and source (paper, section 5), beside a run."""
 
 from __future__ import annotations
 

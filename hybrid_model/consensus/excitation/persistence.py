@@ -1,4 +1,4 @@
-"""Persistence of excitation: the constants (mu1, mu2, T) of a network's weights (paper, definition 1; audit, 2).
+"""Persistence of excitation: the constants (mu1, mu2, T) of a network's weights (paper, definition 1).
 
 All signals of interest have the form ``S(t) = F diag(w(t)) F^T`` with a constant factor F, so the integral over a
 window follows from the exact integrals of the weights. What is left is a search over the starts of the windows.
