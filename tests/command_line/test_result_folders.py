@@ -5,6 +5,7 @@ import json
 import pytest
 from small_scenario import small_scenario
 
+from cosim.cli import entry
 from cosim.cli.main import main
 from cosim.cli.outputs import LIST, results_folder
 from cosim.errors import UsageError
@@ -70,3 +71,12 @@ def test_an_interrupt_while_results_are_written(tmp_path, monkeypatch, capsys):
     assert main(call) == 130
     assert capsys.readouterr().err == "hybrid-fmu: interrupted.\n"
     assert names(tmp_path / "out") == []
+
+
+def test_an_interrupt_while_the_command_line_is_imported(monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cosim.cli.main.main", interrupted)
+    assert entry.main() == 130
+    assert capsys.readouterr().err == "hybrid-fmu: interrupted.\n"

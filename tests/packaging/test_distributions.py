@@ -44,7 +44,7 @@ def test_the_wheel_has_every_file_of_the_packages(built):
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         (entry_points,) = [name for name in names if name.endswith("entry_points.txt")]
-        assert "hybrid-fmu = cosim.cli.main:main" in archive.read(entry_points).decode()
+        assert "hybrid-fmu = cosim.cli.entry:main" in archive.read(entry_points).decode()
     assert tracked() - names == set()
     assert {f"{package}/py.typed" for package in PACKAGES} <= names
     assert not [name for name in names if name.split("/")[0] not in PACKAGES and ".dist-info/" not in name]
