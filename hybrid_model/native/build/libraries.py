@@ -39,8 +39,7 @@ const Model *{MODEL_SYMBOL}(void)
 """
 _NETWORKS = next(folder for folder in ENGINE_FOLDERS if folder.name == "networks")
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
-# A model's maps are straight lines of arithmetic: -O2 takes longer to compile them and runs them no faster.
-_MODEL_FLAGS = (*COMMON_FLAGS, *GENERATED_FLAGS, "-O1")
+_MODEL_FLAGS = (*COMMON_FLAGS, *GENERATED_FLAGS)
 
 
 def engine_library() -> Path:
