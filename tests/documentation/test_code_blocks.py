@@ -7,7 +7,7 @@ import sys
 import tomllib
 from pathlib import Path
 
-import matplotlib
+import matplotlib.pyplot
 import pytest
 from page_code import Reader, blocks
 
@@ -42,6 +42,7 @@ def reader(tmp_path, monkeypatch):
         assert closed_loop(read_scenario(ANY_SCENARIO | tomllib.loads(tables), tmp_path)).parts
 
     yield Reader(tmp_path, read_tables)
+    matplotlib.pyplot.close("all")
     for name in set(sys.modules) - before:
         if str(tmp_path) in str(getattr(sys.modules[name], "__file__", "")):
             del sys.modules[name]

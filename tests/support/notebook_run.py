@@ -28,6 +28,7 @@ def run(script: Path):
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
+    plt.close("all")  # of whoever ran before in this process
     notebook = jupytext.read(script)
     names, number = {"__name__": "__main__"}, 0
     with matplotlib.rc_context():
