@@ -2,14 +2,16 @@
 
 A function without breakpoints is traced: it becomes a part of the model's maps. One with breakpoints is, between two of
 them, a polynomial of time whose coefficients are inputs of the compiled model: whoever runs it changes them at each
-breakpoint. What is neither runs in Python.
+breakpoint. One that is no polynomial there is traced as well, and sees times of the present piece only, whose ends are
+such inputs too. What is none of these runs in Python.
 """
 
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi as ca
@@ -19,7 +21,7 @@ import numpy.typing as npt
 from hybrid_model.declare.layout import Place
 from hybrid_model.declare.signals import Inputs, sampled_signal
 from hybrid_model.declare.variables import FloatArray
-from hybrid_model.errors import TraceError
+from hybrid_model.errors import SimulationError, TraceError
 from hybrid_model.native.symbols import expressions, symbols
 from hybrid_model.native.trace import ARGUMENTS, Trace
 
@@ -29,6 +31,23 @@ _SEED_POINTS = 23
 """Points of a piece at which a polynomial must hold: none of them is one of the points it was made from."""
 _HELD = 64.0
 """In units of rounding of the largest value: how well."""
+_OF_PIECE = 4
+"""Numbers in front of the coefficients: middle and half of the length of a piece, its start, the last time in it."""
+
+
+@dataclass(frozen=True)
+class _Pieced:
+    """An input that is a polynomial between breakpoints."""
+
+    place: Place
+    signal: Callable[[float], npt.ArrayLike]
+    known: dict[float, FloatArray] = field(default_factory=dict)
+
+    def on(self, a: float, b: float, last: float) -> FloatArray:
+        """Return what `_fitted` does, once for a piece."""
+        if a not in self.known:
+            self.known[a] = _fitted(self.place, self.signal, a, b, last)
+        return self.known[a]
 
 
 @dataclass(frozen=True)
@@ -39,12 +58,12 @@ class Driven:
     ----------
     followed : casadi.Function
         Of time, the input vector and the coefficients behind it: the input vector that the maps get.
-    pieced : tuple of (Place, callable)
+    pieced : tuple of _Pieced
         The inputs that are polynomials, in the order of their coefficients.
     """
 
     followed: ca.Function
-    pieced: tuple[tuple[Place, Callable[[float], npt.ArrayLike]], ...]
+    pieced: tuple[_Pieced, ...]
 
     @functools.cached_property
     def key(self) -> bytes:
@@ -74,7 +93,7 @@ class Driven:
     @property
     def extra(self) -> int:
         """Number of inputs that the model has behind those of the automaton."""
-        return _extra(self.pieced)
+        return int(self.followed.size1_in(2))
 
     def coefficients(self, a: float, b: float, *, closed: bool) -> FloatArray:
         """Return what the extra inputs are on a piece from `a` to `b`, in s, its end included if it is `closed`.
@@ -86,33 +105,42 @@ class Driven:
         SimulationError
             If it gives what the input cannot be.
         """
-        if not self.pieced:
+        if not self.extra:
             return np.zeros(0)
-        # At the end the signal is the next piece's already, if there is one.
-        last = b if closed else float(np.nextafter(b, a))
-        rows = [_fitted(place, signal, a, b, last) for place, signal in self.pieced]
-        return np.concatenate([[0.5 * (a + b), 0.5 * (b - a) or 1.0], *(row.ravel() for row in rows)])
+        last = _last(a, b, closed=closed)
+        rows = [pieced.on(a, b, last) for pieced in self.pieced]
+        return np.concatenate([[0.5 * (a + b), 0.5 * (b - a) or 1.0, a, last], *(row.ravel() for row in rows)])
 
 
-def drive(inputs: Inputs) -> Driven:
-    """Return inputs that follow functions of time.
+def drive(inputs: Inputs, span: tuple[float, float]) -> Driven:
+    """Return inputs that follow functions of time from the start to the end of a span, in s.
 
     Raises
     ------
     TraceError
-        If a function without breakpoints cannot be traced.
+        If a function cannot be traced, and has no breakpoints or is no polynomial between two of them.
     """
-    t, u = ca.SX.sym("t"), ca.SX.sym("u", len(inputs.held))
+    t, u, of_piece = ca.SX.sym("t"), ca.SX.sym("u", len(inputs.held)), ca.SX.sym("piece", _OF_PIECE)
+    ends = [span[0], *inputs.breakpoints_in(*span), span[1]]
     elements = ca.vertsplit(u)
     pieced = []
     for place, signal, breakpoints in inputs.signals:
-        if breakpoints:
-            pieced.append((place, signal))
-        else:
+        if not breakpoints:
             elements[place.at] = _traced(place, signal, t)
-    coefficients = ca.SX.sym("coefficients", _extra(pieced))
-    first = 2
-    for place, _ in pieced:
+        elif (unfitted := _unfitted(one := _Pieced(place, signal), ends)) is None:
+            pieced.append(one)
+        else:
+            # A step that ends at a breakpoint must not see what is from there on.
+            inside = ca.fmin(ca.fmax(t, of_piece[2]), of_piece[3])
+            try:
+                elements[place.at] = _traced(place, signal, inside)
+            except TraceError as error:
+                raise TraceError(f"{unfitted} And {error}") from error
+    size = sum(one.place.variable.size for one in pieced) * (DEGREE + 1)
+    any_pieces = any(breakpoints for _, _, breakpoints in inputs.signals)
+    coefficients = ca.vertcat(of_piece, ca.SX.sym("coefficients", size)) if any_pieces else ca.SX.sym("none", 0)
+    first = _OF_PIECE
+    for place in (one.place for one in pieced):
         last = first + place.variable.size * (DEGREE + 1)
         columns = [coefficients[first + k : last : DEGREE + 1] for k in range(DEGREE + 1)]
         elements[place.at] = ca.vertsplit(_clenshaw(columns, (t - coefficients[0]) / coefficients[1]))
@@ -120,8 +148,23 @@ def drive(inputs: Inputs) -> Driven:
     return Driven(ca.Function("followed", [t, u, coefficients], [ca.vertcat(*elements)]), tuple(pieced))
 
 
-def _extra(pieced: Sequence[tuple[Place, Any]]) -> int:
-    return 2 + sum(place.variable.size for place, _ in pieced) * (DEGREE + 1) if pieced else 0
+def _last(a: float, b: float, *, closed: bool) -> float:
+    # At the end a signal is the next piece's already, if there is one.
+    return b if closed else float(np.nextafter(b, a))
+
+
+def _unfitted(pieced: _Pieced, ends: Sequence[float]) -> TraceError | None:
+    """Return why a signal that may change between its breakpoints is no polynomial on some piece of a run."""
+    try:
+        for k, (a, b) in enumerate(itertools.pairwise(ends)):
+            pieced.on(a, b, _last(a, b, closed=k == len(ends) - 2))
+    except TraceError as error:
+        if pieced.place.variable.discrete:
+            raise
+        return error
+    except SimulationError:
+        pass  # A value that cannot be is told when the run gets there, if it does.
+    return None
 
 
 def _traced(place: Place, signal: Callable[[float], npt.ArrayLike], t: ca.SX) -> list[ca.SX]:

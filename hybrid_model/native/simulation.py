@@ -66,7 +66,7 @@ def native_run(
     require_supported(solver)
     record, stiff = Record.JUMPS if events_only else Record.ALL, solver.method in FOR_STIFF_FLOWS
     for again in (False, True):
-        driven = drive(inputs) if inputs.vary else None
+        driven = drive(inputs, span) if inputs.vary else None
         model = model_of(automaton, check, stiff=stiff, driven=driven)
         run = NativeRun(model)
         set_options(run, solver, zeno, inputs.layout.sizes[Kind.STATE])

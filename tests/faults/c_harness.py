@@ -32,7 +32,7 @@ FLAVOURS = {
 }
 _BASE = ("-ffp-contract=off", "-fno-omit-frame-pointer")
 _STRICT = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wformat=2", "-Werror")
-_WRAP = ("-Wl,--wrap=malloc,--wrap=calloc,--wrap=free", "-lm", "-lpthread")
+_WRAP = ("-Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc,--wrap=free", "-lm", "-lpthread")
 _HARNESS = ("harness.c", "importer.c", "shim.c", "threads.c")
 TIME_LIMIT = 60.0  # s for one call, of which none takes a second: far beyond what a loaded machine needs
 

@@ -1,5 +1,7 @@
 """The recording of runs in C: under sanitizers, and each of several faults in it is seen."""
 
+import ctypes
+import math
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -9,10 +11,14 @@ import pytest
 from test_sanitized_host import library
 
 import hybrid_model as hm
-from hybrid_model.models import BouncingBall, SampledLtiLoop
+from hybrid_model.declare.layout import layout_of
+from hybrid_model.declare.signals import Inputs
+from hybrid_model.declare.variables import Kind
+from hybrid_model.models import BouncingBall, SampledLtiLoop, VanDerPol
 from hybrid_model.native import run
 from hybrid_model.native.build.compiler import find_compiler
 from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDERS
+from hybrid_model.native.kept_models import made_model, traced_maps
 
 
 class Saw(hm.HybridAutomaton):
@@ -164,6 +170,59 @@ def test_under_sanitizers(tmp_path):
     preload = ":".join(map(library, ("libasan.so", "libubsan.so")))
     done = in_its_own_process(path, LD_PRELOAD=preload, ASAN_OPTIONS="detect_leaks=0")
     assert (done.returncode, done.stderr) == (0, "")
+
+
+COUNTER = """
+#include <stdlib.h>
+void *__real_malloc(size_t size);
+void *__real_calloc(size_t n, size_t size);
+void *__real_realloc(void *memory, size_t size);
+__attribute__((visibility("default"))) long asked;
+void *__wrap_malloc(size_t size) { asked++; return __real_malloc(size); }
+void *__wrap_calloc(size_t n, size_t size) { asked++; return __real_calloc(n, size); }
+void *__wrap_realloc(void *memory, size_t size) { asked++; return __real_realloc(memory, size); }
+"""
+
+
+@pytest.mark.faults
+@pytest.mark.skipif(sys.platform != "linux", reason="the linker's --wrap")
+def test_nothing_is_allocated_but_for_a_new_engine_and_for_rows(monkeypatch, tmp_path):
+    """With all three methods, looks ahead, jumps, saved and restored states; rows double from 64 on."""
+    counter = tmp_path / "counter.c"
+    counter.write_text(COUNTER)
+    monkeypatch.setitem(SOURCES, counter.name, counter)
+    path = built(tmp_path, "counting", None, ("-O1", "-Wl,--wrap=malloc,--wrap=calloc,--wrap=realloc"))
+    asked = ctypes.c_long.in_dll(ctypes.CDLL(str(path)), "asked")
+    run._engine.cache_clear()
+    monkeypatch.setattr(run, "engine_library", lambda: path)
+
+    def growths(rows):
+        return 0 if rows == 0 else 1 + max(0, math.ceil(math.log2(rows / 64)))
+
+    try:
+        for automaton, end in (
+            (BouncingBall(), 2.4),
+            (SampledLtiLoop(), 4.0),
+            (Saw(), 1.6),
+            (VanDerPol(damping=50.0), 200),
+        ):
+            inputs = Inputs(layout_of(automaton))
+            model = made_model(automaton, traced_maps(automaton), stiff=isinstance(automaton, VanDerPol))
+            start = [inputs.start(Kind.STATE), inputs.start(Kind.DISCRETE), inputs.held, inputs.parameters_at(0.0)]
+            for record in run.Record:
+                before = asked.value
+                engine = run.NativeRun(model)
+                assert asked.value > before
+                before = asked.value
+                assert engine.start(start, 0.0, end, record)
+                engine.restore(engine.save())
+                assert engine.advance(end) is run.Advance.REACHED
+                counts = engine.statistics
+                kept = (counts.steps * (record is run.Record.ALL), counts.jumps * (record is not run.Record.NOTHING))
+                assert asked.value - before == sum(map(growths, kept)), (automaton.name, record, counts)
+                assert (counts.jacobians > 0) is isinstance(automaton, VanDerPol)
+    finally:
+        run._engine.cache_clear()
 
 
 def test_runs_on_threads_do_not_meet():

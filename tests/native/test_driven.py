@@ -119,6 +119,17 @@ def test_a_signal_that_is_no_polynomial_runs_in_python():
     assert arc.end["x"] == pytest.approx(0.5 * np.sqrt(np.pi) * erf(3.0), abs=1e-11)
 
 
+def test_pieces_that_are_no_polynomials_are_traced():
+    """u = sin t until t = 2 and then exp(2 - t): each step that ends at t = 2 sees the sine only."""
+    signal = hm.Signal(lambda t: np.where(t < 2.0, np.sin(t), np.exp(2.0 - t)), [2.0])
+    arc = run(Driven(), 4.0, u=signal)
+    assert arc.event_times("jump") == pytest.approx([np.pi / 2.0, 2.0 - np.log(-np.cos(2.0))], abs=1e-11)
+    times = np.linspace(0.0, 4.0, 81)
+    exact = np.where(times < 2.0, 1.0 - np.cos(times), 1.0 - np.cos(2.0) + 1.0 - np.exp(2.0 - times))
+    np.testing.assert_allclose(arc.at("x", times), exact, rtol=0, atol=1e-13)
+    assert arc.statistics.rejected == 0
+
+
 def test_a_discrete_input_that_changes_between_its_breakpoints_runs_in_python():
     arc = hm.simulate(Follower(), 1.0, inputs={"u": hm.Signal(lambda t: 1.0, [0.5])})
     assert arc.engine.startswith("native: its maps are compiled, together with")
