@@ -76,8 +76,8 @@ class Network:
     values : mapping, optional
         State, input or parameter -> one value for all parts, or an array with a row for each.
     link_values : mapping, optional
-        State or parameter with an element for each link -> an array with an element for each link, in the order in
-        which the links were given, or a matrix with the pattern of `links`.
+        State or parameter whose last axis has an element for each link -> an array whose first axis has one for each
+        link, in the order in which the links were given, or a matrix with the pattern of `links`.
     label : str
         Parts are called by it and their number, from 1.
     count : int, optional
@@ -131,7 +131,7 @@ class Network:
             if place.variable.name in self._values:
                 rows[:, place.at] = self._column(place, members)
             elif place.variable.name in self._link_values and place.variable.size:
-                rows[:, place.at] = self._link_values[place.variable.name][self._links_into(members)]
+                rows[:, place.at] = self._linked(place.variable.name, members)
         return rows
 
     def copy(self, part: int) -> Automaton:
@@ -143,8 +143,9 @@ class Network:
                 if place.variable.name in self._values:
                     starts[place.variable.name] = self._column(place, member).reshape(place.variable.shape)
                 elif place.variable.name in self._link_values and place.variable.size:
-                    column = self._link_values[place.variable.name]
-                    starts[place.variable.name] = column[self._links_into(member)].reshape(place.variable.shape)
+                    starts[place.variable.name] = self._linked(place.variable.name, member).reshape(
+                        place.variable.shape
+                    )
         return Copy(template, self.parts[part], starts)
 
     def composition(self) -> Composition:
@@ -155,9 +156,9 @@ class Network:
             heard = [self.parts[k] for k in senders[first[part] : first[part + 1]]]
             for into, output in self.signals.items():
                 sources = [f"{other}.{output}" for other in heard]
-                scalar = not _variable(self.template(part), into).shape
-                if scalar and not sources:
+                if not sources:
                     continue
+                scalar = not _variable(self.template(part), into).shape
                 connections[f"{name}.{into}"] = sources[0] if scalar else sources
         return Composition(self.name, {name: self.copy(k) for k, name in enumerate(self.parts)}, connections)
 
@@ -166,6 +167,11 @@ class Network:
         first = self.links.first
         degree = int(first[members[0] + 1] - first[members[0]]) if len(members) else 0
         return first[members][:, None] + np.arange(degree)[None, :]
+
+    def _linked(self, name: str, members: Whole) -> FloatArray:
+        """Return the values of the links into parts, the links along the last axis; one row a part."""
+        values = self._link_values[name][self._links_into(members)]
+        return np.moveaxis(values, 1, -1).reshape(len(members), -1)
 
     def _column(self, place: Place, members: Whole) -> FloatArray:
         value = self._values[place.variable.name]
@@ -191,7 +197,7 @@ class Network:
             given = matrix.tocoo().data
         value = _finite(self.name, name, given)
         links = len(self.links.order)
-        if value.shape != (links,):
+        if value.shape[:1] != (links,):
             raise DeclarationError(
                 f"{self.name}: {name} is given with shape {value.shape}: give one value for each of {links} links."
             )
@@ -200,7 +206,7 @@ class Network:
             if not degrees.any():
                 continue
             shape = _variable(template, name).shape
-            if any(shape != (degree,) for degree in degrees):
+            if any(shape != (*value.shape[1:], degree) for degree in degrees):
                 raise DeclarationError(
                     f"{self.name}: {name} has shape {shape}, but there are parts that hear {int(degrees[-1])} others: "
                     "give it among the values, or make the part for its degree, part=lambda degree: ..."
@@ -216,8 +222,10 @@ class Network:
         degrees = self.links.degrees
         for into, output in self.signals.items():
             for group, template in enumerate(self.templates):
-                size = _variable(template, into, Kind.INPUT).size
                 most = int(degrees[self.members[group]].max(initial=0))
+                if most == 0 and len(self.templates) > 1:
+                    continue
+                size = _variable(template, into, Kind.INPUT).size
                 if size < most:
                     raise WiringError(
                         f"{self.name}: {into} has {size} elements, but a part hears {most} others: make the part for "

@@ -205,7 +205,8 @@ def table_of_arrays(network: Network, start: float, stop: float, *, stiff: bool)
 
 def _input(template: Automaton, name: str) -> int:
     places = layout_of(template).places[Kind.INPUT]
-    return next(int(place.at.start) for place in places if place.variable.name == name)
+    # Where nothing is heard, there may be no place for it.
+    return next((int(place.at.start) for place in places if place.variable.name == name), 0)
 
 
 def _model(run: Execution, *, stiff: bool) -> NativeModel:

@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 import hybrid_model as hm
+from hybrid_model.consensus.laws.channels import link_seeds
 from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agent
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import TriggerKind
-from hybrid_model.consensus.switching.base import NoSwitching
+from hybrid_model.consensus.switching.base import NoSwitching, masks
+from hybrid_model.consensus.switching.cycle import SwitchingCycle
+from hybrid_model.consensus.switching.sequence import SwitchingSequence
 from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 from hybrid_model.declare.variables import FloatArray
+from hybrid_model.schedule.links import Whole
 
 _SEE_ALIKE = (
     *(TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.MIXED, TriggerKind.RELATIVE, TriggerKind.GIRARD),
@@ -23,9 +27,10 @@ _SEE_ALIKE = (
 def agent_network(scenario: Scenario) -> hm.Network | hm.Composition:
     """Return what `hm.simulate_network` runs for a scenario.
 
-    Agents with equally many neighbours are copies where they differ in start values and in numbers of their weights
-    alone: then no object is made for any of them. With switching or a channel, with weights from tables or functions,
-    and with laws that know their edges, the network is composed of its agents one by one.
+    Agents with equally many neighbours are copies where they differ in start values and in numbers of their edges
+    alone, those of weights, of a switching topology and of a channel: then no object is made for any of them. With
+    weights from tables or functions, and with laws that know their edges, the network is composed of its agents one by
+    one.
 
     Parameters
     ----------
@@ -50,13 +55,15 @@ def agent_network(scenario: Scenario) -> hm.Network | hm.Composition:
     def agent(degree: int) -> hm.Automaton:
         return scenario_agent(scenario, int(np.argmax(degrees == degree)) + 1)
 
+    links = edges.ravel(), edges[:, ::-1].ravel()
+    signals = {"neighbours": "broadcast"} | ({} if scenario.channel.ideal else {"sent": "events"})
     return hm.Network(
         scenario.name,
         agent,
-        (edges.ravel(), edges[:, ::-1].ravel()),
-        {"neighbours": "broadcast"},
+        links,
+        signals,
         values={"x": np.array(scenario.network.initial)},
-        link_values={f"weights.{name}": np.repeat(column, 2) for name, column in _numbers(scenario).items()},
+        link_values=_numbers(scenario, *links),
         label="agent",
         count=scenario.network.agents,
     )
@@ -65,8 +72,7 @@ def agent_network(scenario: Scenario) -> hm.Network | hm.Composition:
 def _are_copies(scenario: Scenario) -> bool:
     return (
         scenario.trigger.kind in _SEE_ALIKE
-        and isinstance(scenario.switching, NoSwitching)
-        and scenario.channel.ideal
+        and isinstance(scenario.switching, (NoSwitching, SwitchingCycle, SwitchingSequence))
         and len({wave.automaton for wave in scenario.weights.waveforms}) == 1
         and _is_by_number(scenario.weights.waveforms[0].automaton)
     )
@@ -77,7 +83,17 @@ def _is_by_number(automaton: type[hm.Automaton]) -> bool:
     return issubclass(automaton, EdgeAutomaton) and automaton.of.__func__ is EdgeAutomaton.of.__func__  # type: ignore[attr-defined]
 
 
-def _numbers(scenario: Scenario) -> dict[str, FloatArray]:
-    """Return the numbers of the weights, one for each edge."""
-    waveforms = scenario.weights.waveforms
-    return dict(waveforms[0].automaton.columns(waveforms))
+def _numbers(scenario: Scenario, receivers: Whole, senders: Whole) -> dict[str, FloatArray]:
+    """Return the numbers of weights, switching and channel, one or one row for each link."""
+    waveforms, switching, channel = scenario.weights.waveforms, scenario.switching, scenario.channel
+    found = {
+        f"weights.{name}": np.repeat(column, 2) for name, column in waveforms[0].automaton.columns(waveforms).items()
+    }
+    if isinstance(switching, (SwitchingCycle, SwitchingSequence)):
+        active = np.array(masks(switching.active, range(len(waveforms))), dtype=np.float64)
+        found["switching.active"] = np.repeat(active.T, 2, axis=0)
+    if not channel.ideal:
+        pairs = zip((receivers + 1).tolist(), (senders + 1).tolist(), strict=True)
+        seeds = [link_seeds(channel.seed, receiver, [sender])[0] for receiver, sender in pairs]
+        found["channel.random"] = np.array(seeds, dtype=np.float64)
+    return found
