@@ -10,6 +10,7 @@ from typing import Any
 
 from cosim.errors import MisfitError
 from cosim.slave import Port, Slave
+from cosim.sources import Linear, Source
 
 SETTLED = 1e-14
 """Part of a signal by which it may change and still have settled in a loop that is iterated."""
@@ -46,26 +47,6 @@ class Connection:
 
     def __str__(self) -> str:
         return f"{self.source}.{self.output} -> {self.target}.{self.input}"
-
-
-@dataclass(frozen=True)
-class Linear:
-    """An output of which ``factor * value + offset`` arrives, in the unit of the input.
-
-    Attributes
-    ----------
-    source : str
-        ``"slave.output"``.
-    factor, offset : float
-    """
-
-    source: str
-    factor: float = 1.0
-    offset: float = 0.0
-
-
-Source = str | Sequence[str] | Linear
-"""What drives an input: an output, outputs for the elements of an array, or a scaled output."""
 
 
 class System:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from cosim.system import Source
+from cosim.sources import Source
 
 FMU, AUTOMATON = "fmu", "automaton"
 

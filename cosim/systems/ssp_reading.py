@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import MisfitError
-from cosim.system import Linear, Source
+from cosim.sources import Linear, Source
 from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
 from fmu.archives.checks import LIMITS
 from fmu.archives.reading import Archive, ArchiveError

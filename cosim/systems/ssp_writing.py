@@ -11,7 +11,8 @@ from lxml import etree
 
 from cosim.errors import MisfitError
 from cosim.slave import Port, Slave
-from cosim.system import Linear, System
+from cosim.sources import Linear
+from cosim.system import System
 from cosim.systems.definition import FMU, SystemDefinition
 from cosim.systems.ssp_reading import DESCRIPTION, VERSIONS
 from fmu.archives.writing import package

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import MisfitError
-from cosim.system import Linear, Source
+from cosim.sources import Linear, Source
 from cosim.systems.definition import AUTOMATON, FMU, Component, Experiment, SystemDefinition
 
 _TABLES = ("name", "experiment", "components", "connections", "inputs")

@@ -10,7 +10,7 @@ import hybrid_model as hm
 from cosim.cli.main import main
 from cosim.errors import MisfitError
 from cosim.masters import run_fixed_step
-from cosim.system import Linear
+from cosim.sources import Linear
 from cosim.systems.assembly import assemble
 from cosim.systems.files import read_system
 from cosim.systems.ssp_reading import read_ssp
