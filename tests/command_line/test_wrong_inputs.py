@@ -507,7 +507,7 @@ SLIPS = [
     (lambda: run().event_times("bounce"), "BouncingBall (jumps) has no variable 'bounce'; it has jump."),
     (
         lambda: run().save("run.xyz"),
-        "run.xyz ends in '.xyz', but an arc is saved as .npz, which hm.load_arc reads, or as .csv, its",
+        "run.xyz ends in '.xyz', but an arc is saved as .npz, which hm.load_arc reads, or as .csv, .mat or .nc, its",
     ),
     (
         lambda: hm.load_arc("text.fmu"),
