@@ -215,3 +215,24 @@ def test_the_same_events_as_the_network_in_this_process(exported):
     assert [name for name, _ in component.jumps] == names
     near([time for _, time in component.jumps], events.t, 1e-12)
     component.free()
+
+
+def test_states_saved_after_a_reset_keep_the_start_values(binaries):
+    """What was computed from the whole before, such as derivatives, leaves nothing behind."""
+
+    def run(component, save):
+        assert component.enter_initialization() == OK
+        component.set("p2.x", 0.7)
+        if save:
+            component.bytes()
+        component.do("ExitInitializationMode")
+        component.step(0.0, 0.5)
+        return component.bytes()
+
+    component = Component(binaries("3.0")[0])
+    first = run(component, save=False)
+    status, _ = component.derivative("GetDirectionalDerivative", ["p0.level"], ["p0.push"], [1.0])
+    assert status == OK
+    component.do("Reset")
+    assert run(component, save=True) == first
+    component.free()

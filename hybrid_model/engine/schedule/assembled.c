@@ -56,6 +56,8 @@ void assembled_set_hook(Assembled *assembled, StepHook hook, void *context)
 void assembled_reset(Assembled *assembled)
 {
     schedule_clear(assembled->schedule);
+    /* The whole begins anew by itself. */
+    assembled->filled = assembled->mirrored = false;
 }
 
 bool assembled_running(const Assembled *assembled)
