@@ -8,6 +8,7 @@ derivatives. Reading must leave every byte of a state as it is.
 import functools
 import random
 
+import numpy as np
 import pytest
 from fmi_driver.binary import OK, Binary
 from fmi_driver.component import Component
@@ -235,4 +236,42 @@ def test_states_saved_after_a_reset_keep_the_start_values(binaries):
     assert status == OK
     component.do("Reset")
     assert run(component, save=True) == first
+    component.free()
+
+
+class Weight(hm.HybridAutomaton):
+    """Falls, and is thrown up again from the ground: more states than jump sets, and a flow set."""
+
+    heard = hm.Input(0.0, discrete=True)
+    x = hm.State([1.0, 0.0], shape=2, output=True)
+    sent = hm.DiscreteState(0, integer=True, output=True)
+
+    def flow_map(self, s):
+        return {"x": [s.x[1], -9.81 + 0.01 * s.heard]}
+
+    def flow_set(self, s):
+        return s.x[0] + 1.0
+
+    transitions = (
+        hm.Jump(
+            "bounce",
+            lambda self, s: np.minimum(-s.x[0], -s.x[1] - 0.5),
+            lambda self, s: {"x": [0.0, -0.9 * s.x[1]], "sent": s.sent + 1},
+        ),
+    )
+
+
+def test_the_margins_are_those_of_the_parts_that_have_them(exported):
+    parts = {f"w{k}": Weight(f"w{k}", x=[1.0 + k / 20, 0.0]) for k in range(16)}
+    wires = {f"w{k}.heard": f"w{(k + 1) % 16}.sent" for k in range(16)}
+    component = Component(Binary(exported(hm.Composition("weights", parts, wires))))
+    component.begin()
+    for k in range(12):
+        component.step(0.07 * k, 0.07)
+        values = component.values()
+        states = [(values[f"{name}.x[1]"], values[f"{name}.x[2]"]) for name in parts]
+        expected = [min(-x, -v - 0.5) for x, v in states]
+        near([values[f"margin.{name}.bounce"] for name in parts], expected, 1e-12)
+        near([values["margin.flow_set"]], [min(x for x, _ in states) + 1.0], 1e-12)
+    assert sum(values[f"{name}.sent"] for name in parts) >= 16
     component.free()

@@ -9,7 +9,9 @@ static uint32_t owner(const Assembly *of, Bank bank, size_t index, size_t *own)
     size_t low = 0, high = of->n_parts;
 #define FIRST(i)                                                                                                       \
     (bank == BANK_DISCRETE ? of->places[i].z : bank == BANK_PARAMETER ? of->places[i].p                                \
-     : bank == BANK_OUTPUT ? of->places[i].y : of->places[i].x)
+     : bank == BANK_OUTPUT    ? of->places[i].y                                                                        \
+     : bank == BANK_INDICATOR ? of->places[i].margin                                                                   \
+                              : of->places[i].x)
     while (high - low > 1) {
         size_t middle = low + (high - low) / 2;
         if (FIRST(middle) <= index)
@@ -67,7 +69,9 @@ const double *assembled_values(Assembled *assembled, View view, Bank bank, size_
     uint32_t part = owner(assembled->of, bank, index, &own);
     uint32_t next = view == VIEW_PENDING && schedule->pending.count > 0 ? schedule->pending.parts[0] : NOBODY;
     bool computed = bank != BANK_STATE && bank != BANK_DISCRETE;
-    if (next != NOBODY && computed) {
+    /* The margin of the flow set, which lies behind those of the jump sets, is of all parts. */
+    bool of_all = bank == BANK_INDICATOR && index >= whole->model->n_margins;
+    if (of_all || (next != NOBODY && computed)) {
         /* What is computed from the jump that comes next, and from what it sends. */
         const double *values = engine_values(assembled_whole(assembled), view, bank);
         return values ? values + index : NULL;
