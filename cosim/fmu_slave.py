@@ -61,7 +61,8 @@ class FmuSlave(Slave):
         self.has_event_mode = bool(getattr(interface, "hasEventMode", False))
         self.can_restore = bool(interface.canGetAndSetFMUstate)
         self.variable_step = bool(getattr(interface, "canHandleVariableCommunicationStepSize", True))
-        self.foresees = self._file.foresees
+        # FMI asks FMUs to name their time events. Ours name the first of all, unless an input may move those on states.
+        self.foresees = self._file.ours and all(port.discrete for port in inputs)
         self.stops_after_events = self._file.stops_after_events
         self.default_start_time, self.default_stop_time = self._file.start_time, self._file.stop_time
         self.default_step, self.internal_step = self._file.step, self._file.internal_step

@@ -32,5 +32,5 @@ def run(options: argparse.Namespace) -> int:
     ]
     if options.no_browser:
         call.append("--headless")
-    print(f"http://127.0.0.1:{options.port}, until Ctrl-C", flush=True)
+    print(f"http://127.0.0.1:{options.port} until Ctrl-C", flush=True)
     return int(Exit.DONE if subprocess.run(call, check=False).returncode in (0, 130, -2) else Exit.FAILED)

@@ -20,7 +20,7 @@ COMMANDS = {
     "certify": ("certify", "bounds of a scenario beside what a run shows"),
     "sweep": ("sweep", "many runs of a scenario with other values, as a table"),
     "export": ("export", "export an automaton or a scenario's agents as FMUs"),
-    "cosim": ("cosimulate", "co-simulate a scenario's agents, or run one FMU"),
+    "cosim": ("cosimulate", "run an FMU, a system of several, or a scenario's agents as FMUs"),
     "validate": ("validate", "check anybody's FMU"),
     "app": ("app", "an interactive page with sliders, in a browser"),
     "doctor": ("doctor", "what this machine has: compilers, cache, extras, platforms"),

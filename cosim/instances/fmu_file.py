@@ -82,17 +82,14 @@ class FmuFile:
             self.step = self.internal_step
 
     @property
-    def foresees(self) -> bool:
-        """Whether its nextEventTime is the first of all of its events.
-
-        FMI asks of FMUs that they name their time events; the events on the states of others come unannounced.
-        """
+    def ours(self) -> bool:
+        """Whether this project's exporter made it."""
         return str(self.description.generationTool).startswith(OWN_TOOL)
 
     @property
     def stops_after_events(self) -> bool:
         """Whether it ends its steps after its events, if `STOP_AT_EVENTS` is set."""
-        return self.foresees and any(v.name == STOP_AT_EVENTS for v in self.description.modelVariables)
+        return self.ours and any(v.name == STOP_AT_EVENTS for v in self.description.modelVariables)
 
     def claim(self) -> None:
         """Note that an instance is about to be made.
@@ -140,7 +137,7 @@ class FmuFile:
 
     def _unpacked(self) -> _Unpacked:
         """Return the FMU on disk: ours keep nothing outside of instances, so all of one file share one library."""
-        if not self.foresees:
+        if not self.ours:
             return _Unpacked(self._path)
         told = Path(self._path).stat()
         key = str(Path(self._path).resolve()), told.st_mtime_ns, told.st_size

@@ -39,6 +39,12 @@ dozen operations, as the dense output itself has."""
 UNREADABLE = (zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, ValueError, KeyError, RuntimeError)
 """What the zip and npy readers raise on files that are not theirs or not whole."""
 
+_SAMPLE_READERS = {
+    ".csv": "hm.Samples.from_csv",
+    ".mat": "scipy.io.loadmat",
+    ".nc": "xarray.open_dataset",
+}
+
 Table = Mapping[str, Any]
 
 
@@ -84,10 +90,8 @@ def write_record(record: RunRecord, path: Path) -> None:
 
 def read_record(path: Path) -> RunRecord:
     """Read what `write_record` has written; `load_arc` calls it and says what it raises."""
-    if path.suffix.lower() == ".csv":
-        raise DataError(
-            f"{path} holds samples alone, if anything: read it by hm.Samples.from_csv; arcs are .npz files."
-        )
+    if reader := _SAMPLE_READERS.get(path.suffix.lower()):
+        raise DataError(f"{path} holds samples alone, if anything: read it by {reader}; arcs are .npz files.")
     content = _content(path)
     try:
         return _record(content)

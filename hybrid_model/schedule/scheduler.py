@@ -360,7 +360,9 @@ class Scheduler:
                 if place.t > first + self._instant(place, first):
                     place.block.restore(state)
                     place.t = t
-                    self._step(place, first)
+                    stopped = [other for other in stopped if other is not place]
+                    if self._step(place, first).event:
+                        stopped.append(place)
         finally:
             for place, _, state in saved:
                 place.block.release(state)

@@ -138,6 +138,32 @@ def test_a_slave_that_cannot_predict_is_stopped_at_its_event_and_others_are_not_
     np.testing.assert_array_equal(result.tick_times("r", "ticks"), result.tick_times("fast", "ticks"))
 
 
+class Purged(Follower):
+    """A follower that starts anew at a known time, too."""
+
+    purges = hm.DiscreteState(0, integer=True, output=True)
+
+    transitions = (
+        hm.TimeEvent(
+            "purge", lambda self, s: 1.75 * (s.purges + 1), lambda self, s: {"x": 0.0, "purges": s.purges + 1}
+        ),
+    )
+
+
+@pytest.mark.parametrize("kind", [AutomatonSlave, FmuSlave])
+def test_a_slave_that_names_its_known_times_alone_may_stop_before_them(kind, exported):
+    """A continuous input keeps states' events unforeseen, while nextEventTime has the known time behind them."""
+    model = Purged("purged") if kind is AutomatonSlave else exported(Purged("purged"), "purged")
+    slow, fast = kind("slow", model), kind("fast", model)
+    slow.set("felt", 0.4)
+    fast.set("felt", 0.8)
+    result = run_event_exact(System([slow, fast], {}), 4.0)
+    assert result.ended is Ended.HORIZON
+    # Whoever was sent back from its own event has none where the other one has.
+    for name, expected in (("slow", [1.75, 3.5]), ("fast", [1.25, 1.75, 3.0, 3.5])):
+        np.testing.assert_allclose([e.t for e in result.events if e.block == name], expected, rtol=0, atol=1e-9)
+
+
 def test_zeno_ends_the_run_with_the_time_of_the_accumulation():
     result = run_event_exact(System(slaves(("ball", BouncingBall())), {}), 5.0)
     assert result.ended is Ended.ZENO

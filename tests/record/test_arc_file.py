@@ -294,6 +294,10 @@ def test_the_name_of_a_file_decides_what_is_written(tmp_path):
     assert hm.verify(BouncingBall(), back).ok
     with pytest.raises(hm.DataError, match=r"ball\.CSV holds samples alone, .*: read it by hm\.Samples\.from_csv"):
         hm.load_arc(tmp_path / "ball.CSV")
+    for name, reader in (("ball.mat", r"scipy\.io\.loadmat"), ("ball.nc", r"xarray\.open_dataset")):
+        ball.save(tmp_path / name)
+        with pytest.raises(hm.DataError, match=rf"{name} holds samples alone, .*: read it by {reader}; arcs are \.npz"):
+            hm.load_arc(tmp_path / name)
     for name in ("ball.xlsx", "ball", "ball.json"):
         with pytest.raises(hm.DataError, match=r"an arc is saved as \.npz, which hm\.load_arc reads, or as \.csv"):
             ball.save(tmp_path / name)
