@@ -1,10 +1,12 @@
 """The interactive page, a marimo notebook: `hybrid-fmu app` serves it, `marimo edit` opens it to be changed."""
 
-from typing import Any
-
 import marimo
 
+__generated_with = "0.25.2"
 app = marimo.App(width="medium", app_title="hybrid-fmu")
+
+with app.setup:
+    from typing import Any
 
 
 @app.cell

@@ -137,7 +137,7 @@ def _text(scenario: Scenario, report: RunReport) -> str:
     gap = "none" if report.min_gap is None else f"{report.min_gap:.6g} s"
     return "\n".join(
         [
-            f"{scenario.name}: {report.message}",
+            f"{scenario.name}: {report.message.removeprefix(f'{scenario.name}: ')}",
             f"  events          {sum(report.events_per_agent)} (per agent {agents})",
             f"  shortest gap    {gap}",
             f"  final states    {_listed(f'{x:.9g}' for x in report.x_end)}",

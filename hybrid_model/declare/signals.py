@@ -257,7 +257,7 @@ def unknown_input(owner: str, name: str, known: Mapping[str, object]) -> str:
     """Return the sentence for an input that an automaton does not have."""
     if not known:
         return f"{owner} has no input {name!r}; it has no inputs: leave it out."
-    return unknown_name(f"{owner} (inputs)", name, known)
+    return unknown_name(owner, name, known, "input")
 
 
 def _finite_breakpoints(name: str, signal: Signal) -> list[float]:

@@ -480,9 +480,9 @@ class Values:
 _set_owner, _set_values = (vars(Values)[slot].__set__ for slot in Values.__slots__)
 
 
-def unknown_name(owner: str, name: str, known: Mapping[str, Any]) -> str:
+def unknown_name(owner: str, name: str, known: Mapping[str, Any], kind: str = "variable") -> str:
     """Return the sentence for a name that an automaton does not have."""
-    return f"{owner} has no variable {name!r}; it has {', '.join(known) or 'none'}."
+    return f"{owner} has no {kind} {name!r}; it has {', '.join(known) or 'none'}."
 
 
 def element_names(variable: Variable) -> list[str]:

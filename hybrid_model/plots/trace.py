@@ -161,7 +161,7 @@ def jump_mask(arc: HybridArc, names: Sequence[str]) -> npt.NDArray[np.bool_]:
     known = {info.name: info for info in arc.automaton.jumps}
     for name in names:
         if name not in known:
-            raise DeclarationError(unknown_name(f"{arc.automaton.name} (jumps)", name, known))
+            raise DeclarationError(unknown_name(arc.automaton.name, name, known, "jump"))
     return np.array([jump.name in names for jump in arc.jumps], dtype=np.bool_)
 
 

@@ -251,7 +251,7 @@ class HybridArc:
         """Return the times in s of the jumps called `name`; DeclarationError if there are none of that name."""
         if name not in [info.name for info in self.automaton.jumps]:
             known = {info.name: info for info in self.automaton.jumps}
-            raise DeclarationError(unknown_name(f"{self.automaton.name} (jumps)", name, known))
+            raise DeclarationError(unknown_name(self.automaton.name, name, known, "jump"))
         jumps = self._record.jumps
         if isinstance(jumps, RowJumps):
             return jumps.times(name)

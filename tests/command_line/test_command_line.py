@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import sys
+import tomllib
 from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
@@ -36,6 +37,11 @@ def test_simulate_prints_one_run_object(small, capsys):
     assert run["events_total"] == sum(run["events_per_agent"]) == sum(map(len, run["event_times"])) > 5
     assert sum(run["x_end"]) == pytest.approx(0.6, abs=1e-12)
     assert {"min_gap", "edge_norm_end", "mean_drift"} <= run.keys()
+
+
+def test_simulate_names_the_scenario_once(small, capsys):
+    assert main(["simulate", small]) == 0
+    assert capsys.readouterr().out.splitlines()[0].count(tomllib.loads(SMALL)["name"]) == 1
 
 
 def test_engines_agree(small, capsys):

@@ -4,6 +4,7 @@ import argparse
 import json
 import os
 import resource
+import socket
 import subprocess
 import sys
 
@@ -91,6 +92,19 @@ def test_doctor_tells_what_there_is(capsys):
     assert found["extras"]["data"]["pandas"]
     assert main(["doctor"]) == 0
     assert "FMUs for" in capsys.readouterr().out
+
+
+def test_the_page_needs_a_port_that_is_free(capsys):
+    pytest.importorskip("marimo")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        for port in (taken.getsockname()[1], 99999):
+            assert main(["app", "--no-browser", "--port", str(port)]) == 2
+            told = capsys.readouterr()
+            assert not told.out
+            assert f"port {port} of this machine" in told.err
+            assert "give another one, --port N" in told.err
 
 
 def test_doctor_without_a_compiler(monkeypatch, capsys):

@@ -504,7 +504,7 @@ SLIPS = [
     (lambda: run()["height"], "BouncingBall has no variable 'height'; it has h, v, g, e."),
     (lambda: run().at("h", 5.0), "a time in [5, 5] s lies outside the run, which covers [0, 1] s."),
     (lambda: run().at("h", "x"), "the times are 'x': give numbers in s."),
-    (lambda: run().event_times("bounce"), "BouncingBall (jumps) has no variable 'bounce'; it has jump."),
+    (lambda: run().event_times("bounce"), "BouncingBall has no jump 'bounce'; it has jump."),
     (
         lambda: run().save("run.xyz"),
         "run.xyz ends in '.xyz', but an arc is saved as .npz, which hm.load_arc reads, or as .csv, .mat or .nc, its",

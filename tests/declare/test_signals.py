@@ -80,8 +80,8 @@ def test_the_array_returned_earlier_does_not_change():
 @pytest.mark.parametrize(
     ("given", "error", "sentence"),
     [
-        ({"v": 1.0}, hm.DeclarationError, r"Plant \(inputs\) has no variable 'v'; it has u, w\."),
-        ({"x": 1.0}, hm.DeclarationError, r"no variable 'x'"),
+        ({"v": 1.0}, hm.DeclarationError, r"Plant has no input 'v'; it has u, w\."),
+        ({"x": 1.0}, hm.DeclarationError, r"no input 'x'"),
         (
             {"u": [1.0, 2.0]},
             hm.DeclarationError,

@@ -93,7 +93,7 @@ def test_values_before_and_after_a_jump_by_name(ball):
 
 def test_event_times_by_name(ball):
     np.testing.assert_array_equal(ball.event_times("jump"), [jump.t for jump in ball.jumps])
-    with pytest.raises(hm.DeclarationError, match=r"BouncingBall \(jumps\) has no variable 'bounce'; it has jump"):
+    with pytest.raises(hm.DeclarationError, match=r"BouncingBall has no jump 'bounce'; it has jump"):
         ball.event_times("bounce")
 
 
