@@ -122,7 +122,8 @@ bool assembled_advance_quietly(Assembled *assembled, double target)
 {
     const Schedule *schedule = assembled->schedule;
     const Queue *queue = &schedule->queue;
-    if (schedule->pending.count > 0 || schedule->n_touched > 0 || schedule->jumps > 0 || assembled->hook)
+    if (schedule->pending.count > 0 || schedule->n_touched > 0 || schedule->jumps > 0 || assembled->hook ||
+        assembled->whole->status->ending != ENDED_NOT)
         return false;
     if (queue->count > 0) {
         double next = queue->times[queue->parts[0]];

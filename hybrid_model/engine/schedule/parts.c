@@ -164,14 +164,22 @@ static void predict(Schedule *schedule, uint32_t i, double steps)
         return;
     Prediction found = (Prediction)engine->status->prediction;
     if (ahead && found == PREDICTION_QUIET && next >= schedule->stop) {
+        part->halts = 0;
         queue_remove(&schedule->queue, i);
         return;
     }
     part->unsure = ahead && found == PREDICTION_RENEWAL;
-    /* An event may be due where a look ahead has ended.  A run that ends where it is has no time to announce; its next
-       step says why it ends. */
-    double now = found == PREDICTION_EVENT ? part->t : part->t + engine_time_ulp(part->t);
-    queue_put(&schedule->queue, i, ahead ? next : now);
+    if (found == PREDICTION_EVENT || part->unsure) {
+        part->halts = 0;
+        /* An event may be due where a look ahead has ended. */
+        queue_put(&schedule->queue, i, ahead ? next : part->t);
+        return;
+    }
+    /* A run that ends ahead has no time to announce; its step says why it ends, and must be long enough for that:
+       rounding by rounding one would not get on. */
+    double end = ahead ? next : part->t, instant = fmax(schedule_instant(schedule, i, end), engine_time_ulp(end));
+    double beyond = end + ldexp(instant, part->halts < MOST_HALTS ? (int)part->halts++ : MOST_HALTS);
+    queue_put(&schedule->queue, i, fmin(beyond, schedule->stop));
 }
 
 void schedule_predict(Schedule *schedule, uint32_t i)

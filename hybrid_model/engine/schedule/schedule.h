@@ -16,6 +16,8 @@
 #define NO_JUMP UINT32_MAX
 /* Event iterations of one part at one instant, and steps of it in a row that lead nowhere, at most. */
 #define MOST_ITERATIONS 10000
+/* By how many doublings a step grows that is to show why a run ends, at most. */
+#define MOST_HALTS 24
 
 /* Parts with the same maps. */
 typedef struct {
@@ -42,6 +44,7 @@ typedef struct {
     bool touched, pending;
     bool unsure;                  /* its place in the queue is where its look ahead ended, no event */
     bool far;                     /* it has looked ahead as far as it may */
+    uint32_t halts;               /* looks ahead in a row that have found that its run ends */
 } Part;
 
 /* Predicted events, the earliest first and those of one time in the order of parts: a binary heap that knows where in
