@@ -101,7 +101,7 @@ def test_inputs_that_do_not_fit(given, error, sentence):
 
 
 def test_an_unknown_name_cannot_be_held():
-    with pytest.raises(hm.DeclarationError, match="no variable 'v'"):
+    with pytest.raises(hm.DeclarationError, match="no input 'v'"):
         inputs().hold("v", 1.0)
 
 

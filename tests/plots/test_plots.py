@@ -640,7 +640,7 @@ def test_every_plot_of_every_kind_of_run_is_drawn_without_a_word(arcs, kind, plo
         (lambda arc: plots.plot_over_time(arc, "x[1]"), "no variable 'x[1]'"),
         (lambda arc: plots.plot_over_time(arc, "h[1]"), "no element h[1]: h has shape ()"),
         (lambda arc: plots.plot_over_time(arc, ["h", "v"]), "write names one after the other"),
-        (lambda arc: plots.plot_over_time(arc, "h", jumps=["bounce"]), "no variable 'bounce'; it has jump"),
+        (lambda arc: plots.plot_over_time(arc, "h", jumps=["bounce"]), "no jump 'bounce'; it has jump"),
         (lambda arc: plots.plot_over_jumps(arc, "x"), "no variable 'x'"),
         (lambda arc: plots.plot_phase(arc, "h", "x"), "no variable 'x'"),
         (lambda arc: plots.plot_hybrid_arc(arc, "x"), "no variable 'x'"),

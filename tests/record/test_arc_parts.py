@@ -241,7 +241,7 @@ def test_gaps_between_events_leave_out_internal_jumps_unless_named(switched):
     assert [jump.name for jump in switched.jumps] == ["tick", "hidden", "tick"]
     np.testing.assert_array_equal(switched.inter_event_times(), [2.0])
     assert switched.inter_event_times("hidden").size == 0
-    with pytest.raises(hm.DeclarationError, match="no variable 'tock'"):
+    with pytest.raises(hm.DeclarationError, match="no jump 'tock'"):
         switched.inter_event_times("tock")
 
 
