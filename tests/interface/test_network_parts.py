@@ -275,3 +275,38 @@ def test_the_margins_are_those_of_the_parts_that_have_them(exported):
         near([values["margin.flow_set"]], [min(x for x, _ in states) + 1.0], 1e-12)
     assert sum(values[f"{name}.sent"] for name in parts) >= 16
     component.free()
+
+
+class Echo(hm.HybridAutomaton):
+    """Answers what it hears, and for ever once `loud`."""
+
+    heard = hm.Input(0.0, discrete=True)
+    loud = hm.Parameter(0.0, tunable=True)
+    x = hm.State(0.0)
+    mine = hm.DiscreteState(0.0)
+    sent = hm.DiscreteState(0.0, output=True)
+
+    def flow_map(self, s):
+        return {"x": 1.0}
+
+    transitions = (
+        hm.Jump(
+            "answer",
+            lambda self, s: s.heard - s.mine - 0.5 + s.loud,
+            lambda self, s: {"mine": s.heard, "sent": s.heard + 1.0},
+        ),
+    )
+
+
+def test_after_the_end_in_event_mode_no_jump_is_shown_that_would_come_next(exported):
+    parts = {f"e{k}": Echo(f"e{k}") for k in range(16)}
+    wires = {f"e{k}.heard": f"e{(k - 1) % 16}.sent" for k in range(16)}
+    component = Component(Binary(exported(hm.Composition("echoes", parts, wires))), events=True)
+    component.begin()
+    component.do("EnterEventMode")
+    component.set("e3.loud", 1.0)
+    _, update = component.iterate()
+    assert update.terminate
+    assert component.get("e3.sent") == 1.0
+    assert component.get("e4.sent") == component.get("e4.mine") == 0.0
+    component.free()

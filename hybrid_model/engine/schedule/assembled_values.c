@@ -67,7 +67,9 @@ const double *assembled_values(Assembled *assembled, View view, Bank bank, size_
     if (bank == BANK_INPUT || bank == BANK_PARAMETER)
         return (bank == BANK_INPUT ? whole->u : whole->p) + index;
     uint32_t part = owner(assembled->of, bank, index, &own);
-    uint32_t next = view == VIEW_PENDING && schedule->pending.count > 0 ? schedule->pending.parts[0] : NOBODY;
+    /* After the end of a run nothing comes next. */
+    bool pends = view == VIEW_PENDING && schedule->pending.count > 0 && whole->status->ending == ENDED_NOT;
+    uint32_t next = pends ? schedule->pending.parts[0] : NOBODY;
     bool computed = bank != BANK_STATE && bank != BANK_DISCRETE;
     /* The margin of the flow set, which lies behind those of the jump sets, is of all parts. */
     bool of_all = bank == BANK_INDICATOR && index >= whole->model->n_margins;
