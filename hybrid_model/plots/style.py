@@ -34,6 +34,10 @@ JOURNAL: dict[RcKeyType, Any] = {
     "figure.constrained_layout.use": True,
     "savefig.dpi": 300,
     "pdf.fonttype": 42,
+    # matplotlib's own values: other libraries change them for the whole process (findings/pathsim-style.sh).
+    "path.simplify": True,
+    "path.simplify_threshold": 1 / 9,
+    "agg.path.chunksize": 0,
     # No creation date and no random identifiers: the same run gives the same file.
     "svg.hashsalt": "hybrid-fmu",
 }
