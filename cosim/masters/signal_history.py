@@ -42,11 +42,6 @@ class SignalHistory:
         return other
 
     @property
-    def is_point(self) -> bool:
-        """Whether there is one point only, so that nothing is known of slopes."""
-        return len(self._times) == 1
-
-    @property
     def last(self) -> FloatArray:
         """The last values."""
         return self._values[-1]

@@ -59,7 +59,7 @@ def link(name, target="/etc/passwd", kind=stat.S_IFLNK):
     [
         ("../evil.txt", "traversal"),
         ("resources/../../evil.txt", "traversal"),
-        ("/tmp/evil.txt", "absolute"),
+        ("/elsewhere/evil.txt", "absolute"),
         ("//server/share", "absolute"),
         ("C:/evil.txt", "drive"),
         ("resources/data.txt:stream", "drive"),

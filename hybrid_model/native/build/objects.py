@@ -67,7 +67,7 @@ def kept_units(
     toolchain: Toolchain,
     folder: Path,
     foreign_headers: Sequence[Path] = (),
-    warnings: Sequence[str] = STRICT_FLAGS,
+    flags: Sequence[str] = STRICT_FLAGS,
 ) -> list[Unit]:
     """Return units of sources that include no other headers than those of the folders named: their objects are kept.
 
@@ -81,12 +81,12 @@ def kept_units(
         What compiles them.
     folder : Path
         Where objects go.
-    warnings : sequence of str
-        Flags: strict for sources of this project.
+    flags : sequence of str
+        Beside the common ones: strict warnings for sources of this project.
     """
     # Foreign headers are system headers, so that strict warnings speak of our own code only.
     includes = [*(f"-I{place}" for place in header_folders), *(f"-isystem{place}" for place in foreign_headers)]
-    flags = (*COMMON_FLAGS, *warnings)
+    flags = (*COMMON_FLAGS, *flags)
     headers = digest(file for place in (*header_folders, *foreign_headers) for file in sorted(place.rglob("*.h")))
     # Where files lie is no part of a key.
     basis = (toolchain.identity, toolchain.command[1:], flags, headers)
