@@ -74,7 +74,7 @@ class ExchangeSlave(FmuSlave):
             getattr(self._file.interface, "completedIntegratorStepNotNeeded", False)
             or (self._instance.major == 3 and not getattr(self._file.interface, "needsCompletedIntegratorStep", True))
         )
-        self._flow = ContinuousPart(self._instance, self._calls, states, indicators, completes)
+        self._flow = ContinuousPart(self._instance, self.calls, states, indicators, completes)
 
     def begin(self) -> None:
         """See `Slave.begin`."""
@@ -114,7 +114,7 @@ class ExchangeSlave(FmuSlave):
         for _ in range(ITERATIONS):
             event, terminate = self._advance(t_next)
             if terminate:
-                return Step(self._t, event, self._calls.termination())
+                return Step(self._t, event, self.calls.termination())
             if not event:
                 return Step(self._t, False)
             if self._events:

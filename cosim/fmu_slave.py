@@ -46,6 +46,8 @@ class FmuSlave(Slave):
 
     kind = "CoSimulation"
     """The interface of the FMU that is used."""
+    calls: FmuCalls
+    """What calls its functions."""
 
     def __init__(self, name: str, path: str | Path, *, validate: bool = True) -> None:
         self._file = FmuFile(name, path, validate=validate, kind=self.kind)
@@ -66,7 +68,7 @@ class FmuSlave(Slave):
         self.stops_after_events = self._file.stops_after_events
         self.default_start_time, self.default_stop_time = self._file.start_time, self._file.stop_time
         self.default_step, self.internal_step = self._file.step, self._file.internal_step
-        self._calls = FmuCalls(name)
+        self.calls = FmuCalls(name)
         self._access: FmuAccess | None = None
         self._do_step: Callable[[float, float], Advance | None] = self._first_step
         self._begun = False
@@ -121,7 +123,7 @@ class FmuSlave(Slave):
 
     def load(self) -> FmuInstance:
         """Load the FMU's binary, once for all runs; `start` does it if nobody has."""
-        return self._file.load(self._calls.hear)
+        return self._file.load(self.calls.hear)
 
     def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:
         """See `Slave.start`."""
@@ -131,14 +133,12 @@ class FmuSlave(Slave):
         self._file.claim()
         self._events, self._early = events, early
         try:
-            self._calls(instance.instantiate, events, early)
+            self.calls(instance.instantiate, events, early)
         except Exception as error:
             self._file.yield_claim()
             other = ". The fixed-step master (--master fixed-step) leaves its event mode off." if events else ""
-            raise CosimError(
-                f"{self.name} refuses to be instantiated: {self._calls.said.rstrip('.')}{other}"
-            ) from error
-        self._access = FmuAccess(instance, self._variables, self._calls)
+            raise CosimError(f"{self.name} refuses to be instantiated: {self.calls.said.rstrip('.')}{other}") from error
+        self._access = FmuAccess(instance, self._variables, self.calls)
         self._enter_event, self._enter_step = map(instance.caller, ("EnterEventMode", "EnterStepMode"))
         self._iterate = instance.updater()
         if self.clocks:
@@ -146,32 +146,41 @@ class FmuSlave(Slave):
         self._access.start(
             {STOP_AT_EVENTS: True, **self._starts} if early and self.stops_after_events else self._starts
         )
-        self._calls(instance.enter_initialization, t_start, t_stop)
+        self.calls(instance.enter_initialization, t_start, t_stop)
 
     def begin(self) -> None:
         """See `Slave.begin`."""
-        self._calls(self._instance.call, "ExitInitializationMode")
+        self.calls(self._instance.call, "ExitInitializationMode")
         self._begun = True
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
-        self._calls(self._enter_event)
+        self.calls(self._enter_event)
 
     def enter_step_mode(self) -> None:
         """See `Slave.enter_step_mode`."""
-        self._calls(self._enter_step)
+        self.calls(self._enter_step)
 
     def update(self) -> Update:
         """See `Slave.update`."""
         ticks = self._ticks()
-        again, terminate, time = self._calls(self._iterate)
-        return Update(again, ticks, time, self._calls.termination() if terminate else None)
+        again, terminate, time = self.calls(self._iterate)
+        return Update(again, ticks, time, self.calls.termination() if terminate else None)
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Slave.step`."""
         size = t_next - t if self.variable_step else self._size(t_next - t)
-        told = self._calls(self._do_step, t, size)
+        told = self.calls(self._do_step, t, size)
         return Step(t_next, False) if told is None else self._carry_on(t, t_next, told)
+
+    @property
+    def steps_by_one_call(self) -> bool:
+        """Whether a step is a call of DoStep from one time to the next, as they are."""
+        return self.variable_step and self.kind == FmuSlave.kind
+
+    def answered(self, t: float, t_next: float, status: int, told: Advance) -> Step:
+        """Return what a step gave that somebody else called DoStep for, and carry it on."""
+        return self._carry_on(t, t_next, self.calls.answer(self._instance.answered, t, status, told))
 
     def _carry_on(self, t: float, t_next: float, told: Advance | None) -> Step:
         """Return what a step gave that the FMU has said something of, carried on where it stopped for nothing."""
@@ -183,35 +192,35 @@ class FmuSlave(Slave):
             reached = told.reached if early else t_next
             stopped = early and self._early and reached > t
             if (told.event and self._events) or stopped or told.terminate or reached >= t_next:
-                ended = self._calls.termination() if told.terminate else None
+                ended = self.calls.termination() if told.terminate else None
                 return Step(reached, told.event or stopped, ended)
             if not reached > t:
                 raise CosimError(
-                    f"{self.name} returns from a step at {t:.17g} s and gets no further: {self._calls.said}"
+                    f"{self.name} returns from a step at {t:.17g} s and gets no further: {self.calls.said}"
                 )
             t = reached
-            told = self._calls(self._do_step, t, t_next - t if self.variable_step else self._size(t_next - t))
+            told = self.calls(self._do_step, t, t_next - t if self.variable_step else self._size(t_next - t))
         raise CosimError(f"{self.name} returned early from one step {MAX_PARTS} times, the last time at {t:.17g} s.")
 
     def save(self) -> Any:
         """See `Slave.save`."""
         if not self.can_restore:
             raise CosimError(f"{self.name} cannot save its state: its canGetAndSetFMUState is false.")
-        return self._calls(self._instance.save), self._running.held()
+        return self.calls(self._instance.save), self._running.held()
 
     def restore(self, state: Any) -> None:
         """See `Slave.restore`."""
-        self._calls(self._instance.restore, state[0])
+        self.calls(self._instance.restore, state[0])
         self._running.recall(state[1])
 
     def release(self, state: Any) -> None:
         """See `Slave.release`."""
-        self._calls(self._instance.release, state[0])
+        self.calls(self._instance.release, state[0])
 
     def close(self) -> None:
         """See `Slave.close`."""
         if self._access is not None:
-            if not self._calls.fatal:
+            if not self.calls.fatal:
                 self._access.instance.free()
             self._access, self._do_step, self._begun = None, self._first_step, False
             self._file.yield_claim()
@@ -239,7 +248,7 @@ class FmuSlave(Slave):
     def _ticks(self) -> tuple[str, ...]:
         if not self.clocks:
             return ()
-        active = self._calls(self._active)
+        active = self.calls(self._active)
         if True not in active:
             return ()
         return tuple(clock for clock, ticked in zip(self.clocks, active, strict=True) if ticked)

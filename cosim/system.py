@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import MisfitError
+from cosim.rounds import reading_round
 from cosim.slave import Port, Slave
 from cosim.sources import Linear, Source
 
@@ -147,11 +148,12 @@ class System:
         order = sorted(range(len(places)), key=places.__getitem__)
         if len(readers) == 1:
             return readers[0]
+        read_all = reading_round(readers) or (lambda: [value for read_slave in readers for value in read_slave()])
+        if places == sorted(places):
+            return read_all
 
         def read() -> list[Any]:
-            values: list[Any] = []
-            for read_slave in readers:
-                values += read_slave()
+            values = read_all()
             return [values[k] for k in order]
 
         return read

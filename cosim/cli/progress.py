@@ -72,6 +72,8 @@ class Work:
 
     def part(self, part: float, detail: str = "") -> None:
         """Tell which part of the stage is done, from 0 to 1."""
+        if not self._shows:  # of a run's every row, which may be a million
+            return
         with self._lock:
             if self._pace is None:
                 # What was done already when somebody goes on with a sweep is no pace.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import accumulate
 from typing import Any
 
@@ -10,6 +11,35 @@ from cosim.errors import CosimError
 from cosim.instances.calls import FmuCalls
 from cosim.instances.variables import STRUCTURAL, FmuVariables
 from fmu.importer.instance import BoundCall, FmuInstance
+
+
+@dataclass(frozen=True)
+class FmuReader:
+    """Reads scalars of one instance.
+
+    Attributes
+    ----------
+    calls : FmuCalls
+    bound : list of BoundCall
+        What reads numbers.
+    others : dict
+        Scalars that are read one by one, by name, and their values.
+    at : list of tuple
+        For each scalar, in order, where its value is: an array or a table, and the place there.
+    """
+
+    access: FmuAccess
+    calls: FmuCalls
+    bound: list[BoundCall]
+    others: dict[str, Any]
+    at: list[tuple[Any, Any]]
+
+    def __call__(self) -> list[Any]:
+        """Return the values."""
+        self.calls(self.access.instance.call_all, self.bound)
+        for name in self.others:
+            self.others[name] = self.access.read(name)
+        return [values[k] for values, k in self.at]
 
 
 class FmuAccess:
@@ -66,8 +96,8 @@ class FmuAccess:
         if instance.in_one_call(variable) is None:
             getter, arguments = instance.getter(variable, size)
             return lambda: calls(getter, *arguments)[index]
-        call, values = instance.numbers([variable], [size])
-        bound = [call]
+        bound = [instance.numbers([variable], [size])]
+        values = bound[0].values
 
         def read() -> Any:
             calls(instance.call_all, bound)
@@ -75,40 +105,32 @@ class FmuAccess:
 
         return read
 
-    def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
+    def reader(self, names: Sequence[str]) -> FmuReader:
         """Return what reads scalars: numbers of one type in one call of the FMU, and all else one by one."""
         groups: dict[str, list[str]] = {}
         for name in names:
             kind = self.instance.in_one_call(self._variables.places[name][0])
             if kind is not None:
                 groups.setdefault(kind, []).append(name)
-        calls, places = [], dict[str, tuple[Any, Any]]()
+        bound, places = [], dict[str, tuple[Any, Any]]()
         for group in groups.values():
             call, found = self._group(group)
-            calls.append(call)
+            bound.append(call)
             places |= found
         # One by one, into a table by name.
         others: dict[str, Any] = {name: None for name in names if name not in places}
         places |= {name: (others, name) for name in others}
-        at, call_all = [places[name] for name in names], self.instance.call_all
-
-        def read_all() -> list[Any]:
-            self._calls(call_all, calls)
-            for name in others:
-                others[name] = self.read(name)
-            return [values[k] for values, k in at]
-
-        return read_all
+        return FmuReader(self, self._calls, bound, others, [places[name] for name in names])
 
     def _group(self, names: Sequence[str]) -> tuple[BoundCall, dict[str, tuple[Any, Any]]]:
         """Return the call that reads scalars of one type, and in which array, and where in it, it puts each of them."""
         variables = {place[0].valueReference: place[0] for place in map(self._variables.places.__getitem__, names)}
         sizes = [self._variables.size(variable) for variable in variables.values()]
         firsts = dict(zip(variables, accumulate([0, *sizes]), strict=False))
-        call, values = self.instance.numbers(list(variables.values()), sizes)
+        call = self.instance.numbers(list(variables.values()), sizes)
         owners = {name: self._variables.places[name] for name in names}
         return call, {
-            name: (values, firsts[variable.valueReference] + index) for name, (variable, index) in owners.items()
+            name: (call.values, firsts[variable.valueReference] + index) for name, (variable, index) in owners.items()
         }
 
     def write(self, name: str, value: Any) -> None:

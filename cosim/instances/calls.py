@@ -29,16 +29,18 @@ class FmuCalls:
     ----------
     fatal : bool
         Whether a call was fatal; after it no function may be called, the one that frees the instance neither.
+    messages : deque of tuple
+        Status and text of what the FMU said in the present call, or in the last.
     """
 
     def __init__(self, name: str) -> None:
         self._name = name
-        self._messages: deque[tuple[int, str]] = deque(maxlen=MESSAGES)
+        self.messages: deque[tuple[int, str]] = deque(maxlen=MESSAGES)
         self.fatal = False
 
     def hear(self, status: int, text: str) -> None:
         """Take a message of the FMU: its status, and its text."""
-        self._messages.append((status, text))
+        self.messages.append((status, text))
 
     def __call__(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Call a function of fmpy.
@@ -48,8 +50,12 @@ class FmuCalls:
         CosimError
             If the FMU answers with an error, with the last message of this call, or does not have the function.
         """
-        if self._messages:
-            self._messages.clear()
+        if self.messages:
+            self.messages.clear()
+        return self.answer(function, *arguments)
+
+    def answer(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Do the same with what reads the answer to a call that was made: the messages are those of that call."""
         try:
             return function(*arguments)
         except FMICallException as error:
@@ -61,12 +67,12 @@ class FmuCalls:
     @property
     def said(self) -> str:
         """The last message."""
-        return self._messages[-1][1] if self._messages else "the FMU logged no message"
+        return self.messages[-1][1] if self.messages else "the FMU logged no message"
 
     def termination(self) -> Termination:
         """Return why the FMU ended the run in its last call.
 
         FMI has no reason for terminateSimulation, which is no failure by itself; the message that goes with it tells.
         """
-        status, text = self._messages[-1] if self._messages else (fmi3OK, "")
+        status, text = self.messages[-1] if self.messages else (fmi3OK, "")
         return Termination(text, "Zeno" in text, failed=status > fmi3Warning)

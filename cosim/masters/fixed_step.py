@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from cosim.errors import CosimError, MisfitError
@@ -11,6 +11,7 @@ from cosim.masters.changes import Changes, Given
 from cosim.masters.start import outputs, require_times, sample_end, start_slaves
 from cosim.masters.treatments import by_fixed_steps
 from cosim.result import CosimResult, Watch
+from cosim.rounds import Ending, stepping_round
 from cosim.system import System
 
 ORDERS = ("jacobi", "gauss-seidel")
@@ -86,11 +87,11 @@ def run_fixed_step(
         start_slaves(system, t_start, t_stop, events=False, changes=changes)
         points = _Points(system, record)
         result.keep(t_start, record, points.read())
-        hand_on = order == "gauss-seidel"
+        step_all = _stepping(system, hand_on=order == "gauss-seidel")
         # Time by index: adding up steps would drift (rule 9).
         for k in range(1, count + 1):
             t_next = t_stop if k == count else t_start + k * step
-            if not _step_all(system, result, t_next, hand_on):
+            if not step_all(result, t_next):
                 sample_end(system, result, result.t, record)
                 break
             recorded = points.read()
@@ -105,19 +106,35 @@ def run_fixed_step(
     return result
 
 
-def _step_all(system: System, result: CosimResult, t_next: float, hand_on: bool) -> bool:
-    t = result.t
-    for name, slave in system.slaves.items():
-        _, _, terminated = made = slave.step(t, t_next)
-        result.steps += 1
-        if terminated:
-            result.terminate(name, made.reached, terminated)
-            return False
-        if hand_on:
-            for wire in system.from_slave(name):
-                system.slaves[wire.target].set(wire.input, wire.carried(slave.get(wire.output)))
-    result.t = t_next
-    return True
+def _stepping(system: System, *, hand_on: bool) -> Callable[[CosimResult, float], bool]:
+    """Return what steps all slaves to a time, and whether the run goes on."""
+    slaves = list(system.slaves.values())
+    in_one_round = None if hand_on else stepping_round(slaves)
+
+    def by_turns(t: float, t_next: float) -> Ending | None:
+        for k, slave in enumerate(slaves):
+            reached, _, terminated = slave.step(t, t_next)
+            if terminated:
+                return k, reached, terminated
+            if hand_on:
+                for wire in system.from_slave(slave.name):
+                    system.slaves[wire.target].set(wire.input, wire.carried(slave.get(wire.output)))
+        return None
+
+    step_slaves = in_one_round or by_turns
+
+    def step_all(result: CosimResult, t_next: float) -> bool:
+        ended = step_slaves(result.t, t_next)
+        if ended is None:
+            result.steps += len(slaves)
+            result.t = t_next
+            return True
+        k, reached, terminated = ended
+        result.steps += k + 1
+        result.terminate(slaves[k].name, reached, terminated)
+        return False
+
+    return step_all
 
 
 class _Points:

@@ -10,7 +10,7 @@ import operator
 import struct
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import IO
 
@@ -112,8 +112,14 @@ class Archive:
         """
         return b"".join(self._chunks(self._members[name]))
 
-    def extract(self, folder: Path) -> Path:
+    def extract(self, folder: Path, without: Collection[str] = ()) -> Path:
         """Write all files and folders, empty ones too, below an existing folder, and return it.
+
+        Parameters
+        ----------
+        folder : Path
+        without : collection of str
+            Folders at the top of the archive that are left in it.
 
         Raises
         ------
@@ -121,8 +127,12 @@ class Archive:
             If the bytes of a file are damaged.
         """
         for name in self._folders:
+            if name.split("/", 1)[0] in without:
+                continue
             folder.joinpath(*name.removesuffix("/").split("/")).mkdir(parents=True, exist_ok=True)
         for name, member in self._members.items():
+            if name.split("/", 1)[0] in without:
+                continue
             target = folder.joinpath(*name.split("/"))
             target.parent.mkdir(parents=True, exist_ok=True)
             with target.open("xb") as file:

@@ -19,8 +19,6 @@ from fmu.standard.value_types import C_TYPES, FLOATS, INTEGERS, accessor
 
 Getter = tuple[Callable[..., list[Any]], tuple[Any, ...]]
 """A function of fmpy, and the arguments with which it returns all elements of one variable."""
-BoundCall = tuple[str, Callable[[], int]]
-"""The name of a function of the FMU, and what calls it with arguments that it has been given."""
 _CLASSES = {
     (2, "CoSimulation"): FMU2Slave,
     (2, "ModelExchange"): FMU2Model,
@@ -33,6 +31,25 @@ _PLAIN: dict[str, Callable[[Any], Any]] = {"Boolean": bool, "String": lambda tex
 
 class VersionError(ValueError):
     """An FMU is asked for a function that its version of the standard does not have."""
+
+
+class BoundCall(NamedTuple):
+    """A function of the FMU that reads numbers, and its arguments.
+
+    Attributes
+    ----------
+    name : str
+        Of the function.
+    make : callable
+        Calls it, and returns its status.
+    references, values : array of ctypes
+        Which variables it reads, and into what.
+    """
+
+    name: str
+    make: Callable[[], int]
+    references: Any
+    values: Any
 
 
 class Advance(NamedTuple):
@@ -141,8 +158,8 @@ class FmuInstance:
             found = _converted(found, _PLAIN[variable.type])
         return found, ([variable.valueReference], *(() if self.major == 2 else (size,)))
 
-    def numbers(self, variables: Sequence[Any], sizes: Sequence[int]) -> tuple[BoundCall, Any]:
-        """Return the call that reads all elements of variables whose types `in_one_call` names alike, and into what.
+    def numbers(self, variables: Sequence[Any], sizes: Sequence[int]) -> BoundCall:
+        """Return the call that reads all elements of variables whose types `in_one_call` names alike.
 
         Masters read the same outputs at each of many steps: what the call needs is made once, for as long as the
         instance lives.
@@ -151,13 +168,13 @@ class FmuInstance:
         name = f"fmi{self.major}Get{accessor(kind, self.major)}"
         references = (c.c_uint32 * len(variables))(*(variable.valueReference for variable in variables))
         values = (C_TYPES[self.major][kind] * sum(sizes))()
-        return (name, self._on_values(name, references, values)), values
+        return BoundCall(name, self._on_values(name, references, values), references, values)
 
     @staticmethod
     def call_all(calls: Sequence[BoundCall]) -> None:
         """Make calls that are bound, one after the other."""
-        for name, call in calls:
-            status = call()
+        for name, make, _, _ in calls:
+            status = make()
             if status > fmi1Warning:
                 raise FMICallException(function=name, status=status)
 
@@ -231,14 +248,23 @@ class FmuInstance:
 
         def step(t: float, size: float) -> Advance | None:
             time.value, length.value = t, size
-            status = call()
-            if status > fmi1Warning:
-                raise FMICallException(function="fmi3DoStep", status=status)
-            if event.value or terminate.value or early.value:
-                return Advance(reached.value, event.value, terminate.value, early.value)
+            if (status := call()) > fmi1Warning or event.value or terminate.value or early.value:
+                return self.answered(t, status, Advance(reached.value, event.value, terminate.value, early.value))
             return None
 
         return step
+
+    def answered(self, t: float, status: int, told: Advance) -> Advance | None:
+        """Return what DoStep's answer to a step from `t` on says, as `stepper` does."""
+        if self.major == 2:
+            return self._discarded(t, status) if status else None
+        if status > fmi1Warning:
+            raise FMICallException(function="fmi3DoStep", status=status)
+        return told
+
+    def address(self, name: str) -> int:
+        """Return where a function of the FMU is, by its whole name."""
+        return int(c.cast(self.fmu.dll[name], c.c_void_p).value or 0)
 
     def _discarded(self, t: float, status: int) -> Advance | None:
         if status != fmi2Discard:

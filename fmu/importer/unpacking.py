@@ -8,10 +8,12 @@ from pathlib import Path
 from fmu.archives.reading import Archive
 
 _RESOURCES = "resources"
+_FOR_OTHERS = ("documentation", "sources")
+"""What people read and compilers take: a binary has its own files in its resources (FMI 3.0.2 section 2.5)."""
 
 
 def unpack(archive: Archive, folder: Path) -> Path:
-    """Write all files of an archive below an existing folder, and return it.
+    """Write what an archive's binaries may use below an existing folder, and return it.
 
     There is a folder for resources then, whether it holds any or not: packers drop empty folders, and FMUs look for it.
 
@@ -26,7 +28,7 @@ def unpack(archive: Archive, folder: Path) -> Path:
     ArchiveError
         If the bytes of a file are damaged.
     """
-    archive.extract(folder)
+    archive.extract(folder, _FOR_OTHERS)
     (folder / _RESOURCES).mkdir(exist_ok=True)
     return folder
 

@@ -16,6 +16,7 @@ from hybrid_model.native.build.kept_files import kept
 from hybrid_model.native.build.objects import (
     COMMON_FLAGS,
     GENERATED_FLAGS,
+    STRICT_FLAGS,
     Toolchain,
     compile_units,
     digest,
@@ -100,6 +101,22 @@ def model_library(source: str) -> Path:
 
     basis = _engine_digest("*.[ch]" if loops else "*.h")
     return kept(f"model{_SUFFIX}", repr((toolchain, _MODEL_FLAGS, basis, _EXPORT, source)), make)
+
+
+def source_library(source: Path) -> Path:
+    """Return the shared library of one C file that includes nothing of the engine, and marks what it exports.
+
+    Raises
+    ------
+    BuildError
+        If there is no C compiler, or it fails.
+    """
+    toolchain = _toolchain()
+
+    def make(library: Path) -> None:
+        _link(toolchain, [*COMMON_FLAGS, *STRICT_FLAGS, str(source)], library, f"compile {source.name}")
+
+    return kept(f"{source.stem}{_SUFFIX}", repr((toolchain, COMMON_FLAGS, STRICT_FLAGS, digest([source]))), make)
 
 
 def _toolchain() -> Toolchain:
