@@ -16,7 +16,6 @@ extensions = [
     "sphinx.ext.autodoc",
     "numpydoc",
     "matplotlib.sphinxext.plot_directive",
-    "site_parts.command_help",
     "site_parts.formulas",
     "site_parts.model_entry",
     "site_parts.page_links",

@@ -14,6 +14,7 @@ from fmu.build.binaries import binaries, fmi_headers, own_files, runtime_sources
 from fmu.build.fmu_code import fmu_code
 from fmu.build.source_files import source_names
 from fmu.describe.description import Description, model_identifier
+from fmu.describe.units import nearest_unit
 from fmu.describe.variable_table import fmu_variables
 from fmu.describe.variables import Fmi
 from fmu.errors import ExportError
@@ -81,7 +82,8 @@ def export_fmu(
     Raises
     ------
     ExportError
-        If a map cannot be traced, a name is taken twice, an option is unknown, or a time is not finite and positive.
+        If a map cannot be traced, a name is taken twice, an option is unknown, a time is not finite and positive, the
+        file is not called ``.fmu``, or a unit is not written as in FMI, such as ``m/s2``.
     fmu.errors.BuildError
         If there is no C compiler, the code does not compile, or the file cannot be written.
     """
@@ -92,7 +94,10 @@ def export_fmu(
         suggested = f"{model_identifier(automaton.name)}.fmu"
         raise ExportError(f"The path {path!r} is no name of a file: give one, such as {suggested!r}.")
     version, target = _version(fmi), Path(path)
+    if target.suffix.lower() != ".fmu" and not target.is_dir():
+        raise ExportError(f"The file '{path}' would be no FMU by its name: call it '{target.with_suffix('.fmu')}'.")
     _check_experiment(stop_time, step_size)
+    _check_units(automaton)
     chosen = _kinds(kinds)
     check_target(target)
     traced = kept_trace(automaton)
@@ -127,6 +132,16 @@ def _check_experiment(stop_time: float | None, step_size: float | None) -> None:
     for name, value in (("stop time", stop_time), ("step size", step_size)):
         if value is not None and not (is_real(value) and math.isfinite(value) and value > 0.0):
             raise ExportError(f"The {name} {value!r} s cannot be proposed: give a finite number above zero, or none.")
+
+
+def _check_units(automaton: Automaton) -> None:
+    used = {variable.unit: variable.name for variable in reversed(automaton.variables)}
+    for unit, name in used.items():
+        meant = nearest_unit(unit)
+        if meant is not None:
+            raise ExportError(
+                f"{automaton.name}.{name} has the unit {unit!r}, which tools do not know: write unit={meant!r}."
+            )
 
 
 def _headers() -> list[Path]:

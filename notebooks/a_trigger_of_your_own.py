@@ -109,7 +109,7 @@ numbers = {
     "dynamic": [(c, beta) for c in (0.2, 0.35, 0.5) for beta in (0.02, 0.06, 0.1)],
     "hyperbolic": [(c, rate) for c in (0.2, 0.35, 0.5) for rate in (0.05, 0.1, 0.3)],
 }
-names = {"dynamic": ("threshold", "decay"), "hyperbolic": ("trigger.c", "trigger.rate")}
+names = {"dynamic": ("threshold", "decay"), "hyperbolic": ("c", "rate")}
 loops = {"dynamic": closed_loop(scenario), "hyperbolic": own}
 figure, ax = plt.subplots(figsize=(4.2, 2.8))
 for color, marker, (law, values) in zip(COLORS[1:], "os", numbers.items(), strict=False):

@@ -124,7 +124,7 @@ def as_text(found: dict[str, Any]) -> str:
         remedy = f'; missing: {", ".join(absent)} (pip install "hybrid-fmu[{extra}]")' if absent else ""
         there = _listed({name: version for name, version in versions.items() if version})
         lines.append(f"extra      {extra}: {there or 'nothing installed'}{remedy}")
-    lines.append(f"a run      {ran['events']} impacts of the bouncing ball; {ran['engine']}")
+    lines.append(f"a run      {ran['events']} impact{'s' * (ran['events'] != 1)} of the bouncing ball; {ran['engine']}")
     if os.environ.get("CC"):
         lines.append(f"CC         {os.environ['CC']}")
     return "\n".join(lines)

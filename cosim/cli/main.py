@@ -9,7 +9,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from cosim.cli.exits import Exit
 from cosim.errors import UsageError
@@ -116,7 +116,25 @@ def _epilog(examples: Sequence[str]) -> str:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Answers a value that an option cannot have by one sentence, as everything else that is refused."""
+    """Answers what it does not know, or a value that an option cannot have, by one sentence, as all that is refused."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> tuple[Any, list[str]]:
+        """Refuse what is left over, by the command that it was given to."""
+        found, rest = super().parse_known_args(args, namespace)
+        if rest:
+            raise UsageError(self._not_taken(rest[0]))
+        return found, rest
+
+    def _not_taken(self, word: str) -> str:
+        if word.startswith("-"):
+            known = [option for action in self._actions for option in action.option_strings]
+            near = difflib.get_close_matches(word, known, n=1)
+            meant = f" Did you mean '{near[0]}'?" if near else ""
+            return f"'{self.prog}' has no option '{word}'.{meant} '{self.prog} --help' lists those that there are."
+        taken = [str(action.metavar) for action in self._actions if not action.option_strings]
+        if not taken:
+            return f"'{self.prog}' takes no argument but options, and '{word}' is one: leave it out."
+        return f"'{self.prog}' takes one {' and one '.join(taken)}, and '{word}' is one more: call it once for each."
 
     def error(self, message: str) -> NoReturn:
         """Refuse what was typed."""

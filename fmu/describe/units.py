@@ -109,6 +109,24 @@ _PREFIXES = {
     **{"Q": 30, "R": 27, "Y": 24, "Z": 21, "E": 18, "P": 15, "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "da": 1},
     **{"d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12, "f": -15, "a": -18, "z": -21, "y": -24},
 }
+_LETTERS = str.maketrans({"²": "2", "³": "3", "⁻": "-", "¹": "1", "µ": "u", "μ": "u", "Ω": "Ohm", "°": "deg"})
+_SYMBOLS = {
+    **{"m": "meter metre", "g": "gram", "kg": "kilogram kilo kgs", "km": "kilometer kilometre", "l": "liter litre"},
+    **{
+        "s": "second sec",
+        "min": "minute",
+        "h": "hour hr",
+        "d": "day",
+        "ms": "msec millisecond",
+        "us": "usec microsecond",
+    },
+    **{"A": "ampere amp", "K": "kelvin", "rad": "radian", "deg": "degree", "Hz": "hertz", "N": "newton", "J": "joule"},
+    **{"Pa": "pascal", "W": "watt", "V": "volt", "F": "farad", "Ohm": "ohm", "C": "coulomb", "mol": "mole"},
+    **{"degC": "celsius degcelsius", "degF": "fahrenheit degfahrenheit", "%": "percent", "rev": "revolution turn"},
+    **{"mm": "millimeter millimetre", "cm": "centimeter centimetre", "rpm": "rpm", "t": "tonne ton"},
+}
+_WORDS = {form: symbol for symbol, words in _SYMBOLS.items() for word in words.split() for form in (word, f"{word}s")}
+_KNOWN = {symbol.lower(): symbol for symbol in reversed([*_PREFIXABLE, *_PLAIN, "kg", "km", "kW", "kHz", "kPa", "MHz"])}
 _SMALLEST, _LARGEST = Fraction(sys.float_info.min), Fraction(sys.float_info.max)
 _FACTOR = re.compile(r"(?P<symbol>[A-Za-z%]+)(?P<exponent>[+-]?\d{1,3})?")
 
@@ -155,6 +173,34 @@ def base_unit(text: str) -> BaseUnit | None:
     return BaseUnit(tuple(exponents), ratio) if _SMALLEST <= ratio <= _LARGEST else None
 
 
+def nearest_unit(text: str) -> str | None:
+    """Return what a unit is called in FMI notation that is written as people write it.
+
+    Parameters
+    ----------
+    text : str
+        Such as ``meter``, ``m/s^2``, ``km*h-1``, ``Hertz`` or ``°C``.
+
+    Returns
+    -------
+    str or None
+        ``m``, ``m/s2`` and so on; None if the unit is known as it is, or means nothing that is known.
+    """
+    if not text or base_unit(text) is not None:
+        return None
+    plain = text.strip().replace("**", "").replace("^", "").replace("−", "-").translate(_LETTERS)
+    plain = re.sub(r"[ *·⋅×]+", ".", re.sub(r"\s*([/*·()])\s*", r"\1", plain))
+    above, *below = re.split(r"/|\.?\bper\b\.?", plain)
+    if len(below) == 1 and "." in below[0] and not below[0].startswith("("):
+        return None
+    bottom = ".".join(part.strip("()") for part in below)
+    joined = f"{above or '1'}/{bottom if '.' not in bottom else f'({bottom})'}" if below else above
+    meant = re.sub(r"[^\W\d_]+", lambda word: _WORDS.get(word[0].lower(), word[0]), joined)
+    found = next((unit for unit in (meant, _KNOWN.get(meant.lower(), "")) if base_unit(unit)), None)
+    expression = _parse(found) if found else None
+    return _written(_merged(expression.above), _merged(expression.below)) if expression else None
+
+
 def unit_per_second(text: str) -> str:
     """Return the unit of a quantity's time derivative: ``m/s2`` for ``m/s``, ``1/s`` for ``1``.
 
@@ -180,6 +226,13 @@ def unit_per_second(text: str) -> str:
             side[at : at + 1] = [("s", power)] if power else []
             return _written(above, below)
     return _written(above, [*below, ("s", 1)])
+
+
+def _merged(factors: Sequence[Factor]) -> list[Factor]:
+    powers: dict[str, int] = {}
+    for symbol, power in factors:
+        powers[symbol] = powers.get(symbol, 0) + power
+    return list(powers.items())
 
 
 def _parse(text: str) -> _Expression | None:

@@ -247,8 +247,27 @@ class HybridArc:
 
     # Jumps and lengths.
 
-    def event_times(self, name: str) -> FloatArray:
-        """Return the times in s of the jumps called `name`; DeclarationError if there are none of that name."""
+    def event_times(self, name: str | None = None) -> FloatArray:
+        """Return the times of jumps.
+
+        Parameters
+        ----------
+        name : str, optional
+            Only jumps of this name; default: all jumps but those declared internal.
+
+        Returns
+        -------
+        ndarray, shape (number of such jumps,)
+            In s.
+
+        Raises
+        ------
+        DeclarationError
+            If no jump has that name.
+        """
+        if name is None:
+            internal = {info.name for info in self.automaton.jumps if info.internal}
+            return np.array([jump.t for jump in self.jumps if jump.name not in internal])
         if name not in [info.name for info in self.automaton.jumps]:
             known = {info.name: info for info in self.automaton.jumps}
             raise DeclarationError(unknown_name(self.automaton.name, name, known, "jump"))
@@ -268,12 +287,9 @@ class HybridArc:
         Parameters
         ----------
         name : str, optional
-            Only jumps of this name; default: all jumps but those declared internal.
+            As for `event_times`.
         """
-        if name is not None:
-            return np.diff(self.event_times(name))
-        internal = {info.name for info in self.automaton.jumps if info.internal}
-        return np.diff(np.array([jump.t for jump in self.jumps if jump.name not in internal]))
+        return np.diff(self.event_times(name))
 
     def before(self, jump: JumpRecord) -> Values:
         """Return all values just before a jump of this arc."""

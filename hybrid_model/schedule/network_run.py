@@ -57,8 +57,8 @@ class NetworkRun:
         assert self._make_events is not None
         return self._make_events()
 
-    def event_times(self, part: str, jump: str) -> FloatArray:
-        """Return the times in s of one part's jumps of one name."""
+    def event_times(self, part: str, jump: str | None = None) -> FloatArray:
+        """Return the times in s of one part's jumps, shape ``(number of them,)``; see `HybridArc.event_times`."""
         return self._arc(part).event_times(jump)
 
     def final(self, name: str) -> FloatArray:

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmu.describe.quantities import display_attributes, quantity
-from fmu.describe.units import BASE_UNITS, base_unit, unit_per_second
+from fmu.describe.units import BASE_UNITS, base_unit, nearest_unit, unit_per_second
 
 
 def in_base_units(**exponents):
@@ -100,6 +100,34 @@ def test_only_what_differs_from_the_defaults_is_written():
 )
 def test_unit_of_a_time_derivative(unit, expected):
     assert unit_per_second(unit) == expected
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        *(
+            ("meter", "m"),
+            ("Metres", "m"),
+            ("seconds", "s"),
+            ("Hertz", "Hz"),
+            ("ohm", "Ohm"),
+            ("KG", "kg"),
+            ("°C", "degC"),
+        ),
+        *(("m/s^2", "m/s2"), ("m/s**2", "m/s2"), ("m/s/s", "m/s2"), ("m s-1", "m.s-1"), ("kg*m/s^2", "kg.m/s2")),
+        *(("m·s⁻²", "m.s-2"), ("meters per second", "m/s"), ("rad/sec", "rad/s"), ("W/m2/K", "W/(m2.K)")),
+    ],
+)
+def test_what_people_write_has_a_name_in_the_notation(written, meant):
+    assert nearest_unit(written) == meant
+    assert base_unit(meant) is not None
+
+
+@pytest.mark.parametrize(
+    "text", [*DEFINITIONS, "", "furlong", "EUR", "1/veh", "apples per hour", "J/kg.K", "<m>", "2m"]
+)
+def test_what_is_right_or_unheard_of_is_left_alone(text):
+    assert nearest_unit(text) is None
 
 
 factors = st.lists(

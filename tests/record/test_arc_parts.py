@@ -240,6 +240,8 @@ def test_flow_lengths_in_a_cascade_are_zero(cascade):
 def test_gaps_between_events_leave_out_internal_jumps_unless_named(switched):
     assert [jump.name for jump in switched.jumps] == ["tick", "hidden", "tick"]
     np.testing.assert_array_equal(switched.inter_event_times(), [2.0])
+    assert switched.event_times().size == 2
+    assert switched.event_times("hidden").size == 1
     assert switched.inter_event_times("hidden").size == 0
     with pytest.raises(hm.DeclarationError, match="no jump 'tock'"):
         switched.inter_event_times("tock")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+from importlib.util import find_spec
 from pathlib import Path
 
 from cosim.cli.options.values import add_json, require_scenario, seconds
@@ -72,7 +73,24 @@ def require_named(options: argparse.Namespace) -> None:
     if Path(target).suffix.lower() == ".py":
         raise UsageError(f"{target} names no class: write {target}:ClassName{_classes(Path(target))}.")
     if ":" not in target or Path(target).suffix.lower() == ".toml":
+        meant = _with_colon(target)
+        if meant:
+            raise UsageError(f"{target} is no scenario: for a class write {meant}.")
         require_scenario(argparse.Namespace(scenario=target))
+
+
+def _with_colon(target: str) -> str:
+    """What was meant by a class behind a dot, ``plant.py:Tank`` by ``plant.Tank``; nothing if there is no module."""
+    module, _, name = target.rpartition(".")
+    if not (module and name.isidentifier()) or Path(target).exists():
+        return ""
+    if module.endswith(".py") or Path(f"{module}.py").is_file():
+        return f"{module.removesuffix('.py')}.py:{name}"
+    parts = module.split(".")
+    inside = Path(*parts).with_suffix(".py")
+    if inside.is_file() or (all(map(str.isidentifier, parts)) and find_spec(parts[0]) is not None):
+        return f"{module}:{name}"
+    return ""
 
 
 def _classes(file: Path) -> str:

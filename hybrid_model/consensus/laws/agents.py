@@ -10,8 +10,10 @@ from hybrid_model.declare.variables import Kind, Value
 
 __all__ = ["ContinuousBroadcast", "ContinuousIntegrator", "Integrator", "agent"]
 
-SHOWN = ("broadcast", "events", "threshold", "decay", "broadcast_clock")
-"""What an agent shows of its event generator under its own name, where the law has it."""
+SHOWN = ("broadcast", "events", "broadcast_clock")
+"""What an agent shows of its event generator under its own name, beside the law's numbers."""
+_COPIES = ("gain", "dwell")
+"""Numbers that a law is told of what is around it; what they are copies of has the name."""
 
 
 class Integrator(hm.HybridAutomaton):
@@ -105,7 +107,8 @@ def agent(
         if "neighbours" in wanted:
             connections["trigger.neighbours"] = "channel.received"
     shown = {variable.name for variable in trigger.variables} | {clock.name for clock in trigger.clocks}
-    names |= {f"trigger.{item}": item for item in SHOWN if item in shown}
+    numbers = [each.name for each in trigger.of_kind(Kind.PARAMETER) if each.shape == () and each.name not in _COPIES]
+    names |= {f"trigger.{item}": item for item in (*SHOWN, *numbers) if item in shown and item not in names.values()}
     return hm.Composition(name, {**parts, "integrator": integrator, "trigger": trigger}, connections, names)
 
 

@@ -138,7 +138,7 @@ def _agent(scenario: Scenario, number: int, velocity: float, damping: float) -> 
         degree=len(edges), x=network.initial[number - 1], v=velocity, gain=network.gain, damping=damping
     )
     parts["trigger"] = ModelBasedTrigger(damping=damping, **trigger.numbers)
-    names = {f"motion.{item}": item for item in ("x", "v", "positions", "velocities", "times")}
+    names = {f"motion.{item}": item for item in ("x", "v", "gain", "damping", "positions", "velocities", "times")}
     names |= {f"trigger.{item}": f"broadcast_{item}" for item in SENT}
-    names |= {f"trigger.{item}": item for item in ("events", "broadcast_clock")}
+    names |= {f"trigger.{item}": item for item in ("events", "broadcast_clock", *trigger.numbers)}
     return hm.Composition(agent_name(number), parts, wires, names)

@@ -6,7 +6,7 @@ A key in a table of a table is ``network.initial.seed``.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -70,6 +70,7 @@ def with_values(entries: Mapping[str, Any], values: Mapping[str, Any]) -> dict[s
     for text, value in sorted(values.items(), key=lambda item: item[0].count("[")):
         key = Key.read(text)
         *tables, name = key.path
+        _require_table(text, key.path, entries)
         place: dict[str, Any] = changed
         for table in tables:
             inner = place.get(table, {})
@@ -79,6 +80,16 @@ def with_values(entries: Mapping[str, Any], values: Mapping[str, Any]) -> dict[s
             place[table] = place = dict(inner)
         place[name] = _replaced(text, place.get(name), key.places, value) if key.places else value
     return changed
+
+
+def _require_table(text: str, path: Sequence[str], entries: Mapping[str, Any]) -> None:
+    """Refuse a key of a table that is named without it."""
+    if len(path) > 1 or path[0] in entries:
+        return
+    tables = [table for table, inner in entries.items() if isinstance(inner, dict) and path[0] in inner]
+    if tables:
+        meant = " or ".join(f"{table}.{text}" for table in tables)
+        raise SweepError(f"'{text}' is no key at the top of a scenario: write {meant}.")
 
 
 def _replaced(text: str, given: Any, places: tuple[int, ...], value: Any) -> Any:

@@ -29,6 +29,7 @@ from hybrid_model.consensus import (
     run_report,
     scenario_agents,
 )
+from hybrid_model.declare.variables import Kind
 
 LAW = '''
 import numpy as np
@@ -120,6 +121,21 @@ def test_a_scenario_file_names_a_class_beside_it(law_file):
     # Each broadcast comes when the error meets the threshold, located to rounding.
     np.testing.assert_allclose(errors, 0.1 / (1 + 0.5 * times), rtol=0, atol=1e-9)
     assert run_report(scenario, arc).events_per_agent[0] == len(times)
+
+
+@pytest.mark.parametrize(
+    ("trigger", "numbers"),
+    [
+        ({"kind": "laws.py:Hyperbolic"}, {"c", "rate"}),
+        ({"kind": "mixed", "threshold": 0.3, "decay": 0.2, "offset": 0.1}, {"threshold", "decay", "offset"}),
+        ({"kind": "self-triggered", "threshold": 0.3, "decay": 0.2}, {"threshold", "decay"}),
+    ],
+)
+def test_numbers_of_a_law_have_names_of_the_agent(law_file, trigger, numbers):
+    """As they stand in [trigger], whosever law it is; what the law copies of its surroundings keeps to itself."""
+    agent = scenario_agents(read_scenario(ring(**trigger), law_file.parent))["agent1"]
+    shown = {variable.name for variable in agent.of_kind(Kind.PARAMETER) if "." not in variable.name}
+    assert shown == {"gain"} | numbers
 
 
 def test_the_command_line_runs_and_certifies_it(law_file, capsys):
