@@ -58,6 +58,23 @@ class Bump(hm.HybridAutomaton):
         return {"count": s.count + 1}
 
 
+class Humps(hm.HybridAutomaton):
+    """A margin like an M, negative at its ends and in its middle, whose humps just reach above zero."""
+
+    x = hm.State(0.0, output=True)
+    count = hm.DiscreteState(0, integer=True, output=True)
+    ticks = hm.Clock("jump")
+
+    def flow_map(self, s):
+        return {"x": 1.0}
+
+    def jump_set(self, s):
+        return hm.least(1e-8 - ((s.x - 1.0) ** 2 - 0.45) ** 2, 0.5 - s.count)
+
+    def jump_map(self, s):
+        return {"count": s.count + 1}
+
+
 MORE = {
     # A guard that is zero at the start is enabled.
     "on guard": Witness(Ramps(a=1.0, limit_a=1.0, name="on_guard"), 1.5, 3),
@@ -69,8 +86,10 @@ MORE = {
     "tie": Witness(Ramps(limit_a=0.5 + 4e-12, limit_b=0.5, first=0.5 + 6e-12, name="tie"), 0.9, 3),
     "guard tie": Witness(Ramps(limit_a=0.5 + 4e-12, limit_b=0.5, name="guard_tie"), 0.9, 3),
     "no tie": Witness(Ramps(limit_a=0.5 + 4e-11, limit_b=0.5, name="no_tie"), 0.9, 3),
-    # No sample of a step sees it, and the parabola through three of them does not either.
+    # No sample of a step sees it.
     "bump": Witness(Bump(), 2.0, 1),
+    # The parabola through three samples lies below zero.
+    "humps": Witness(Humps(), 2.0, 1),
 }
 
 

@@ -5,17 +5,19 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from c_harness import VERSIONS, generated, run
 from c_witnesses import WITNESSES
 
+import cosim
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files, runtime_sources
 from hybrid_model.native.build.compiler import find_compiler
 from hybrid_model.native.build.objects import STRICT_FLAGS
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="gcc and binutils on Linux")
-SOURCES = own_files("*.c")
+SOURCES = [*own_files("*.c"), Path(cosim.__file__).with_name("rounds.c")]
 
 
 def is_gcc():

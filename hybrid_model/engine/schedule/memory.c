@@ -46,6 +46,10 @@ static size_t lay_out(Schedule *schedule, unsigned char *memory)
         group->slab = take(memory, &used, group->count, group->block_size);
         group->sent = take(memory, &used, group->count, group->n_signals * sizeof(double));
     }
+    /* What is written before it is read again is no part of a run. */
+    schedule->size = used;
+    for (size_t k = 0; k < schedule->n_groups; k++)
+        schedule->groups[k].copy = take(memory, &used, 1, schedule->groups[k].block_size);
     return used;
 }
 
@@ -57,7 +61,6 @@ static bool make_group(Schedule *schedule, Group *group, const Model *maps, cons
     engine_set_jump_hook(engine, note_jump, schedule);
     group->home = engine->block;
     group->block_size = engine_block_size(engine);
-    group->copy = malloc(group->block_size);
     group->inputs_at = (size_t)((unsigned char *)(void *)engine->u - engine->block);
     group->signals = signals;
     group->n_signals = n_signals;
@@ -65,7 +68,7 @@ static bool make_group(Schedule *schedule, Group *group, const Model *maps, cons
         group->sends_outputs = group->sends_outputs || signals[k].bank == BANK_OUTPUT;
     if (n_signals > schedule->log.width)
         schedule->log.width = n_signals;
-    return group->copy != NULL;
+    return true;
 }
 
 static bool make_groups(Schedule *schedule, const Model *const models[], const size_t n_signals[],
@@ -91,8 +94,7 @@ Schedule *schedule_create(size_t n_groups, const Model *const models[], const si
     schedule->n_groups = n_groups;
     schedule->n_parts = n_parts;
     bool made = make_groups(schedule, models, n_signals, signals, groups);
-    schedule->size = made ? lay_out(schedule, NULL) : 0;
-    schedule->memory = calloc(1, schedule->size + 1);
+    schedule->memory = calloc(1, made ? lay_out(schedule, NULL) + 1 : 1);
     schedule->due = malloc((n_parts + 1) * sizeof(uint32_t));
     schedule->values = malloc(schedule->log.width * sizeof(double) + 1);
     schedule->changed = malloc(schedule->log.width * sizeof(bool) + 1);
@@ -118,7 +120,6 @@ void schedule_free(Schedule *schedule)
         if (group->engine)
             engine_use_block(group->engine, group->home);
         engine_free(group->engine);
-        free(group->copy);
     }
     log_free(&schedule->log);
     free(schedule->groups);
