@@ -162,22 +162,22 @@ class AutomatonSlave(Slave):
         return self._running.update()
 
     def step(self, t: float, t_next: float) -> Step:
-        """See `Slave.step`."""
+        """See `Block.step`; CosimError if a part gets no further."""
         try:
             return self._running.step(t, t_next)
         except SchedulingError as error:
             raise CosimError(str(error)) from error
 
     def save(self) -> Any:
-        """See `Slave.save`."""
+        """See `Block.save`."""
         return self._running.save()
 
     def restore(self, state: Any) -> None:
-        """See `Slave.restore`."""
+        """See `Block.restore`."""
         self._running.restore(state)
 
     def release(self, state: Any) -> None:
-        """See `Slave.release`."""
+        """See `Block.release`."""
 
     def close(self) -> None:
         """See `Slave.close`."""

@@ -108,7 +108,7 @@ class ExchangeSlave(FmuSlave):
         return made
 
     def step(self, t: float, t_next: float) -> Step:
-        """See `Slave.step`."""
+        """See `Block.step`; CosimError if its events come without end."""
         if t_next <= self._t:
             return Step(self._t, False)
         for _ in range(ITERATIONS):
@@ -125,12 +125,12 @@ class ExchangeSlave(FmuSlave):
         raise CosimError(f"{self.name} gets no further than t = {self._t:.12g} s: {ITERATIONS} events are there.")
 
     def save(self) -> Any:
-        """See `Slave.save`."""
+        """See `Block.save`."""
         here = (self._t, self._due, self._x.copy(), self._atol, self._above.copy(), self._length)
         return (*super().save(), here)
 
     def restore(self, state: Any) -> None:
-        """See `Slave.restore`."""
+        """See `Block.restore`."""
         super().restore(state)
         self._t, self._due, x, self._atol, above, self._length = state[2]
         self._x, self._above = x.copy(), above.copy()

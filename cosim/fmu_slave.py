@@ -168,7 +168,7 @@ class FmuSlave(Slave):
         return Update(again, ticks, time, self.calls.termination() if terminate else None)
 
     def step(self, t: float, t_next: float) -> Step:
-        """See `Slave.step`."""
+        """See `Block.step`."""
         size = t_next - t if self.variable_step else self._size(t_next - t)
         told = self.calls(self._do_step, t, size)
         return Step(t_next, False) if told is None else self._carry_on(t, t_next, told)
@@ -203,18 +203,18 @@ class FmuSlave(Slave):
         raise CosimError(f"{self.name} returned early from one step {MAX_PARTS} times, the last time at {t:.17g} s.")
 
     def save(self) -> Any:
-        """See `Slave.save`."""
+        """See `Block.save`; CosimError if the FMU cannot save its state."""
         if not self.can_restore:
             raise CosimError(f"{self.name} cannot save its state: its canGetAndSetFMUState is false.")
         return self.calls(self._instance.save), self._running.held()
 
     def restore(self, state: Any) -> None:
-        """See `Slave.restore`."""
+        """See `Block.restore`."""
         self.calls(self._instance.restore, state[0])
         self._running.recall(state[1])
 
     def release(self, state: Any) -> None:
-        """See `Slave.release`."""
+        """See `Block.release`."""
         self.calls(self._instance.release, state[0])
 
     def close(self) -> None:

@@ -64,7 +64,7 @@ class ReplayedSlave(Slave):
         return made
 
     def step(self, t: float, t_next: float) -> Step:
-        """See `Slave.step`."""
+        """See `Block.step`."""
         made: Step = self._call("step", t, t_next)
         return made
 
@@ -112,7 +112,7 @@ class ReplayedSlave(Slave):
             getattr(self._slave, name)(*arguments)
 
     def release(self, state: int) -> None:
-        """See `Slave.release`."""
+        """See `Block.release`."""
 
     def close(self) -> None:
         """See `Slave.close`."""

@@ -114,6 +114,11 @@ class Slave(Block):
             Whether the master handles events; if not, the block handles them inside.
         early : bool
             Whether steps may end early where the block handles its events inside; a step that does has `event` set.
+
+        Raises
+        ------
+        CosimError
+            If the block refuses, or has no event mode where the master handles events.
         """
 
     @abstractmethod

@@ -112,20 +112,20 @@ class IsolatedSlave(Slave):
         return made
 
     def step(self, t: float, t_next: float) -> Step:
-        """See `Slave.step`."""
+        """See `Block.step`."""
         made: Step = self._call("step", t, t_next)
         return made
 
     def save(self) -> Any:
-        """See `Slave.save`."""
+        """See `Block.save`."""
         return self._call("save")
 
     def restore(self, state: Any) -> None:
-        """See `Slave.restore`."""
+        """See `Block.restore`."""
         self._call("restore", state)
 
     def release(self, state: Any) -> None:
-        """See `Slave.release`; nothing if the process is gone, and the state with it."""
+        """See `Block.release`; nothing if the process is gone, and the state with it."""
         if self._process is not None:
             self._call("release", state)
 

@@ -136,7 +136,7 @@ class Point:
         self.sizes = np.where(np.isnan(self.nominal), np.maximum(self.sizes, np.abs(x)), self.nominal)
 
     def follow(self, piece: FlowPiece) -> FlowPiece:
-        """Take the end of a piece of the present flow, which must be finite, and return the piece."""
+        """Take the end of a piece of the present flow and return the piece; SimulationError if it is not finite."""
         bad = not_finite(self.layout, Kind.STATE, piece.x1)
         if bad:
             raise SimulationError(f"{self.automaton.name}: {bad} at t = {piece.t1:.9g} s: states must stay finite.")
@@ -225,7 +225,7 @@ class Point:
         return float(self.margins(self.t, self.x)[-1])
 
     def event_times(self) -> FloatArray:
-        """Return the absolute times in s of the jumps on time."""
+        """Return the absolute times in s of the jumps on time, shape ``(jumps,)``; SimulationError if one is none."""
         times = self.maps.event_times(self.t, self.x, self.z, self.inputs.at(self.t), self.p)
         if np.isnan(times).any():
             raise SimulationError(self._undefined("time of jump", self._name(times, on_state=False), self.t))

@@ -1,6 +1,7 @@
 """Every public name says what it takes and gives: parameters with types, shapes, units, errors raised, sources.
 
-Public names are those in the ``__all__`` of `PACKAGES`, and the public methods that their classes define.
+Public names are those in the ``__all__`` of `PACKAGES`, those that README, pages and notebooks name or import, and the
+public methods of their classes.
 """
 
 import ast
@@ -10,10 +11,12 @@ import inspect
 import re
 import sys
 import textwrap
+from pathlib import Path
 
 import pytest
 from numpydoc.docscrape import NumpyDocString
 
+ROOT = Path(__file__).parents[2]
 PACKAGES = (
     "hybrid_model",
     "hybrid_model.consensus",
@@ -34,31 +37,52 @@ SOURCE = re.compile(r"paper|audit|\b(19|20)\d\d\b|section|theorem|rule \d", re.I
 WITH_FORMULAS = tuple(f"hybrid_model.consensus.{room}" for room in ("certificates", "exact", "excitation", "laws"))
 
 
+def in_the_documentation():
+    """Dotted names that readers are told: in sentences, in directives, and by imports in code."""
+    files = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "docs").rglob("*.rst")]
+    text = "\n".join(file.read_text(encoding="utf-8") for file in [*files, *(ROOT / "notebooks").glob("*.py")])
+    yield from re.findall(rf"\b(?:{'|'.join(OWN)})(?:\.\w+)+", text)
+    for module, one_line, several in re.findall(r"^from ([\w.]+) import (?:\(([^)]*)\)|(.*))", text, re.MULTILINE):
+        yield from (f"{module}.{name}" for name in re.findall(r"\w+", f"{one_line} {several}"))
+
+
+def resolved(dotted):
+    """The object of a dotted name, and its own qualified name; None for modules and for what is none of ours."""
+    module, _, name = dotted.rpartition(".")
+    if not module.startswith(OWN) or name.startswith("_"):
+        return None
+    try:
+        thing = getattr(importlib.import_module(module), name)
+    except (ImportError, AttributeError):
+        return None
+    ours = callable(thing) and getattr(thing, "__module__", "").startswith(OWN)
+    return (f"{thing.__module__}.{thing.__qualname__}", thing) if ours and hasattr(thing, "__qualname__") else None
+
+
 def public():
-    """Qualified name -> object: public classes, functions, and the methods and properties that classes define."""
-    found = {}
-    for package in PACKAGES:
-        module = importlib.import_module(package)
-        for name in module.__all__:
-            thing = getattr(module, name)
-            if not getattr(thing, "__module__", "").startswith(OWN) or not callable(thing):
-                continue
-            found[f"{package}.{name}"] = thing
-            for key, member in vars(thing).items() if inspect.isclass(thing) else ():
+    """Qualified name -> object: public classes and functions, and the methods and properties of the classes."""
+    doors = [f"{package}.{name}" for package in PACKAGES for name in importlib.import_module(package).__all__]
+    top = dict(found for found in map(resolved, [*doors, *in_the_documentation()]) if found)
+    members = {}
+    for thing in filter(inspect.isclass, top.values()):
+        for cls in (base for base in thing.__mro__ if base.__module__.startswith(OWN)):
+            for key, member in vars(cls).items():
                 if not key.startswith("_") and (inspect.isroutine(member) or isinstance(member, property)):
-                    found[f"{package}.{name}.{key}"] = getattr(member, "__func__", member)
-    return found
+                    members[f"{cls.__module__}.{cls.__qualname__}.{key}"] = getattr(member, "__func__", member)
+    return top, members
 
 
-PUBLIC = public()
+TOP, MEMBERS = public()
+PUBLIC = TOP | MEMBERS
 WHOLE = {name: thing for name, thing in PUBLIC.items() if not isinstance(thing, property) and callable(thing)}
 
 
-TOP = {name: thing for name, thing in WHOLE.items() if name.rpartition(".")[0] in PACKAGES}
-
-
 def text_of(thing):
-    return inspect.getdoc(thing) or ""
+    """Its docstring, with that of the method which it refers to, such as `Slave.step`."""
+    text = inspect.getdoc(thing) or ""
+    referred = re.match(r"See `(\w+\.\w+)`", text)
+    others = [each for name, each in MEMBERS.items() if referred and name.endswith(f".{referred[1]}")]
+    return "\n".join([text, *(inspect.getdoc(each) or "" for each in others)])
 
 
 def entries(thing):
@@ -85,8 +109,9 @@ def parameters(thing):
 
 
 def test_there_are_as_many_as_one_thinks():
-    assert len(PUBLIC) > 500
-    assert sum(inspect.isclass(thing) for thing in PUBLIC.values()) > 120
+    assert (len(TOP), len(MEMBERS)) > (220, 500)
+    assert {"hybrid_model.simulate.simulate", "fmu.export.export_fmu", "cosim.fmu_slave.FmuSlave"} <= set(TOP)
+    assert {"cosim.slave.Slave.start", "cosim.result.CosimResult.event_times"} <= set(MEMBERS)
 
 
 def test_each_says_what_it_is():

@@ -211,7 +211,8 @@ def plot_broadcasts(scenario: Scenario, event_times: Sequence[npt.ArrayLike], ax
     scenario : Scenario
         What ran.
     event_times : sequence of array_like
-        Times in s of each agent's broadcasts, as in `RunReport.event_times`; of a co-simulation as well.
+        Times in s of each agent's broadcasts, each of shape ``(number of them,)``, as in `RunReport.event_times`; of a
+        co-simulation as well.
     ax : Axes, optional
         Where to draw.
 
