@@ -1,4 +1,4 @@
-"""What the interactive page shows: one run of a small network, what is certified of it, and a picture of both."""
+"""What the interactive page shows: one run of a small network, and what is certified of it."""
 
 from __future__ import annotations
 
@@ -12,16 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 import hybrid_model as hm
 from fmu.export import export_fmu
 from hybrid_model.consensus.certificates.analysis import Analysis, analyse
 from hybrid_model.consensus.certificates.bounds import Bounds
-from hybrid_model.consensus.figures.style import MARKS, agent_color, agent_look
-from hybrid_model.consensus.laws.closed_loop import agent_name, closed_loop, scenario_agents
+from hybrid_model.consensus.laws.closed_loop import closed_loop, scenario_agents
 from hybrid_model.consensus.runs.report import RunReport, edge_norm, run_report
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.files import read_scenario, scenario_entries
@@ -36,9 +32,11 @@ GRAPHS: Mapping[str, list[list[int]]] = {
     "complete": [[1, 2], [1, 3], [1, 4], [2, 3], [2, 4], [3, 4]],
 }
 """Edges by name; the paper's switch between two trees and have its weights, others weights of 1."""
-POINTS = 400
-_known: list[tuple[object, Analysis, float | None, float | None]] = []
-"""The network that was analysed last, with Floquet's rate and factor."""
+_known: dict[object, tuple[Analysis, float | None, float | None]] = {}
+"""Networks that were analysed, the latest last, each with Floquet's rate and factor."""
+_MOST = 200
+MOST_JUMPS = 5000
+"""After so many a run ends: a threshold that decays faster than the states converge brings ever more."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +61,15 @@ class Live:
     radius: float | None
 
     @property
+    def end(self) -> float:
+        """End of the run in s."""
+        return float(self.arc.t[-1])
+
+    @property
     def periodic(self) -> int | None:
         """Broadcasts of agents that all send with the shortest time between two of this run; None without one."""
         gap = self.report.min_gap
-        return None if not gap else len(self.report.events_per_agent) * int(self.scenario.stop_time / gap)
+        return None if not gap else len(self.report.events_per_agent) * int(self.end / gap)
 
     def bound(self, t: FloatArray) -> FloatArray | None:
         """Return the bound on ``||x_e(t)||`` from the start on, shape (n,); None if there is none."""
@@ -85,9 +88,14 @@ class Live:
             told += f"; shortest gap {gap:.4g} s: sent periodically with it, {periodic}, so {saved}"
         bounds = (
             f"Rate {_number(self.rate)} 1/s (Floquet), ultimate radius {_number(self.radius)} (energy), "
-            f"|x_e(T)| = {self.report.edge_norm_end:.4g}"
+            f"edge norm at the end {self.report.edge_norm_end:.4g}"
         )
-        return f"{told}. {bounds}."
+        early = (
+            ""
+            if self.arc.stop is hm.Stop.HORIZON
+            else f"The run ends at {self.end:.4g} s: {len(self.arc.jumps)} jumps. "
+        )
+        return f"{early}{told}. {bounds}."
 
 
 def _number(value: float | None) -> str:
@@ -125,13 +133,15 @@ def scenario_of(graph: str, threshold: float, decay: float, gain: float, dwell: 
 
 def live(scenario: Scenario) -> Live:
     """Run a scenario on the engine in C, and certify what is certified quickly."""
-    arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
-    # What is known of a network is not computed again for another threshold.
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time, zeno=hm.ZenoGuard(max_jumps=MOST_JUMPS))
+    # What is known of a network is not computed again for another threshold, nor when a slider comes back.
     key = (scenario.network, scenario.weights, scenario.switching)
-    if not _known or _known[0][0] != key:
+    if key not in _known:
         first = Bounds(analyse(scenario))
-        _known[:] = [(key, first.analysis, first.floquet_rate, first.floquet_overshoot)]
-    _, analysis, rate, factor = _known[0]
+        _known[key] = first.analysis, first.floquet_rate, first.floquet_overshoot
+        if len(_known) > _MOST:
+            del _known[next(iter(_known))]
+    analysis, rate, factor = _known[key]
     exists = rate is not None and scenario.trigger.decay < rate
     radius = Bounds(analysis.alike(scenario)).energy_radius if exists else None
     return Live(scenario, arc, run_report(scenario, arc), rate, factor, radius)
@@ -145,65 +155,3 @@ def fmus(scenario: Scenario) -> bytes:
             path = export_fmu(automaton, Path(folder) / f"{name}.fmu", stop_time=scenario.stop_time)
             archive.write(path, path.name)
     return written.getvalue()
-
-
-class Picture:
-    """States, broadcasts, an agent's error against its threshold, and the edge norm with its bound.
-
-    The figure is made once; a change of the run moves its lines, which takes a third of the time.
-    """
-
-    def __init__(self) -> None:
-        self._figure = Figure(figsize=(10.0, 5.6), dpi=72)
-        self._canvas = FigureCanvasAgg(self._figure)
-        places = [(0.06, 0.57), (0.56, 0.57), (0.06, 0.08), (0.56, 0.08)]
-        self._axes: list[Axes] = [self._figure.add_axes((x, y, 0.42, 0.37)) for x, y in places]
-        states, raster, error, norm = self._axes
-        agents = range(1, 5)
-        self._states = [states.plot([], [], **agent_look(i), label=f"$x_{i}$")[0] for i in agents]
-        self._dots = [
-            states.plot([], [], linestyle="none", marker=MARKS[i - 1], markersize=4, color=agent_color(i))[0]
-            for i in agents
-        ]
-        self._rows = [
-            raster.plot([], [], linestyle="none", marker="|", markersize=16, color=agent_color(i))[0] for i in agents
-        ]
-        (self._error,) = error.plot([], [])
-        (self._level,) = error.plot([], [], "k--")
-        (self._norm,) = norm.semilogy([], [], "k", label="norm of edge states")
-        (self._bound,) = norm.semilogy([], [], "k-.", label="bound (Floquet, energy)")
-        for ax, title in zip(self._axes, ("states", "broadcasts", "", "edge norm and bound"), strict=True):
-            ax.set_title(title, loc="left", fontsize=10)
-            ax.tick_params(labelsize=8)
-        raster.set(ylim=(4.5, 0.5), yticks=[1, 2, 3, 4], yticklabels=[f"agent {i}" for i in agents])
-        states.legend(loc="upper right", ncols=4, fontsize=8, frameon=False)
-        norm.legend(loc="upper right", fontsize=8, frameon=False)
-
-    def draw(self, shown: Live, agent: int) -> bytes:
-        """Return the picture of a run as PNG; the error is that of one agent, counted from 1."""
-        arc, end = shown.arc, shown.scenario.stop_time
-        t = np.linspace(0.0, end, POINTS)
-        x = np.array([arc.at(f"{agent_name(i)}.x", t) for i in range(1, 5)])
-        for i, times in enumerate(shown.report.event_times):
-            self._states[i].set_data(t, x[i])
-            self._dots[i].set_data(times, arc.at(f"{agent_name(i + 1)}.x", times) if len(times) else [])
-            self._rows[i].set_data(times, np.full(len(times), i + 1))
-        error = np.abs(arc.at(f"{agent_name(agent)}.broadcast", t) - x[agent - 1])
-        level = np.asarray(shown.scenario.trigger.level(t))
-        self._error.set_data(t, error)
-        self._error.set_color(agent_color(agent))
-        self._level.set_data(t, level)
-        norm, bound = edge_norm(shown.scenario, x), shown.bound(t)
-        self._norm.set_data(t, norm)
-        self._bound.set_data(t if bound is not None else [], bound if bound is not None else [])
-        states, _, errors, norms = self._axes
-        errors.set_title(f"error of agent {agent} against its threshold", loc="left", fontsize=10)
-        states.set_ylim(float(x.min()) - 0.1, float(x.max()) + 0.4)
-        errors.set_ylim(0.0, 1.1 * max(float(level.max()), float(error.max())))
-        top = float(max(norm.max(), 0.0 if bound is None else bound.max()))
-        norms.set_ylim(max(float(norm.min()), 1e-6 * top) / 2.0, 3.0 * top)
-        for ax in self._axes:
-            ax.set_xlim(0.0, end)
-        written = io.BytesIO()
-        self._figure.savefig(written, format="png", pil_kwargs={"compress_level": 1})
-        return written.getvalue()

@@ -62,6 +62,8 @@ def energy_radius(analysis: Analysis, decay: float) -> float | None:
             # Every window for itself: each of the first `count` by the roots of the powers of two that make it up.
             single = math.sqrt(strength) * math.exp(decay * window) * series / (1 - share)
             best = min(best, whole, single)
+            if share < np.finfo(float).eps:
+                break  # the next share is no larger than the square of this one, and longer windows cost more
         series *= 1 + share
     return analysis.edge_gain * analysis.box_gain * best if math.isfinite(best) else None
 

@@ -1,5 +1,6 @@
 """The undisturbed flow ``xi' = -k N(t) xi`` on a grid of short cells: what the exact worst case is summed over."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -18,6 +19,7 @@ __all__ = ["TransitionGrid", "affordable_resolution", "dose_between", "joined_fl
 _MOST_PER_PIECE = 100_000
 _MOST_BLOCKS = 256
 _TOGETHER = 4
+_ENTRIES = 40_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,20 +56,17 @@ class TransitionGrid:
         """Largest ``||phi(t + m P, t)||`` over the ends t of the cells of one period P, for m periods."""
         before, after, whole = self._halves
         inner = after if periods == 1 else np.linalg.matrix_power(whole, periods - 1) @ after
-        return float(np.max(np.linalg.norm(before @ inner, 2, axis=(1, 2))))
+        return math.exp(_largest_log_norm(before @ inner, 0.0, -math.inf))
 
     @cached_property
     def _halves(self) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Flows from the start of the period to each cell, from each cell to the end, and over all of it."""
-        size, count = self.flows.shape[1], len(self.flows)
-        before, after = np.empty((count, size, size)), np.empty((count, size, size))
-        flow = np.eye(size)
-        for j in range(count):
-            before[j], flow = flow, self.flows[j] @ flow
-        whole, flow = flow, np.eye(size)
-        for j in range(count - 1, -1, -1):
-            flow = after[j] = flow @ self.flows[j]
-        return before, after, whole
+        size = self.flows.shape[1]
+        forward = _running_products(self.flows)
+        # From the right end the same, of the transposes.
+        backward = _running_products(self.flows[::-1].transpose(0, 2, 1))
+        before = np.concatenate((np.eye(size)[None], forward[:-1]))
+        return before, backward[::-1].transpose(0, 2, 1), forward[-1]
 
     def overshoot(self, rate: float) -> float:
         """``sup ||phi(t, s)|| exp(rate (t - s))`` over starts s in the period and two periods after each.
@@ -87,14 +86,52 @@ class TransitionGrid:
             blocks[k] = flow
         places = np.arange(len(blocks))
         flows, ages, largest = np.broadcast_to(np.eye(size), blocks.shape), np.zeros(len(blocks)), 0.0
-        for j in range(2 * len(blocks)):
-            at = (places + j) % len(blocks)
-            flows, ages = blocks[at] @ flows, ages + lengths[at]
-            # Both factors can leave the range of floats; their product does not.
-            scale = np.log(np.maximum(np.linalg.norm(flows, 2, axis=(1, 2)), np.finfo(float).tiny))
-            largest = max(largest, float(np.max(scale + rate * ages)))
+        # Small matrices are looked at many at a time.
+        many = max(1, _ENTRIES // blocks.size)
+        for first in range(0, 2 * len(blocks), many):
+            products, spans = [], []
+            for j in range(first, min(first + many, 2 * len(blocks))):
+                at = (places + j) % len(blocks)
+                flows, ages = blocks[at] @ flows, ages + lengths[at]
+                products.append(flows)
+                spans.append(ages)
+            largest = _largest_log_norm(np.concatenate(products), rate * np.concatenate(spans), largest)
         within = 2 * rate * float(np.max(lengths)) if step > 1 else 0.0
         return float(np.exp(min(largest + within, 700.0)))
+
+
+def _largest_log_norm(matrices: NDArray[np.float64], plus: NDArray[np.float64] | float, known: float) -> float:
+    """The largest of ``log ||A|| + plus`` over matrices, shape (count, p, p), and of what is `known`.
+
+    Both terms can leave the range of floats as factors; their product does not. ``||A||`` is computed where the norm of
+    Frobenius, which is no smaller, leaves open whether it is the largest.
+    """
+    sizes = np.maximum(np.abs(matrices).max(axis=(1, 2)), np.finfo(float).tiny)
+    scaled = matrices / sizes[:, None, None]
+    scales = np.log(sizes) + plus
+    ceilings = scales + 0.5 * np.log(np.maximum(np.einsum("kij,kij->k", scaled, scaled), 1.0))
+    for rivals in (1, len(matrices)):
+        chosen = np.argsort(-ceilings)[:rivals]
+        chosen = chosen[ceilings[chosen] > known]
+        if len(chosen):
+            norms = np.maximum(np.linalg.norm(scaled[chosen], 2, axis=(1, 2)), np.finfo(float).tiny)
+            known = max(known, float(np.max(scales[chosen] + np.log(norms))))
+    return known
+
+
+def _running_products(flows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """``flows[j] @ ... @ flows[0]`` for each j: in rows side by side, then each row after those before it."""
+    count, size = len(flows), flows.shape[1]
+    length = math.isqrt(count - 1) + 1
+    padding = np.broadcast_to(np.eye(size), (-count % length, size, size))
+    rows = np.concatenate((flows, padding)).reshape(-1, length, size, size)
+    for k in range(1, length):
+        rows[:, k] = rows[:, k] @ rows[:, k - 1]
+    flow = rows[0, -1]
+    for row in rows[1:]:
+        row[:] = row @ flow
+        flow = row[-1]
+    return rows.reshape(-1, size, size)[:count]
 
 
 def transition_grid(

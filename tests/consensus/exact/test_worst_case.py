@@ -95,3 +95,23 @@ class TestTransitionGrid:
         np.testing.assert_allclose(
             transition_grid(scenario, 0.0, 3.0, 0.02).product(), transition_matrix(scenario, 0.0, 3.0), atol=1e-9
         )
+
+
+@pytest.mark.parametrize("periods", [1, 3])
+def test_contraction_and_overshoot_are_those_of_all_norms(periods):
+    """Norms are computed where it is open whether they are the largest: the same as computing all of them."""
+    grid = transition_grid(load_scenario("paper-a"), 0.0, 2 * np.pi, 0.1)
+    n, identity = len(grid.flows), np.eye(3)
+    total, age, largest = {j: identity for j in range(n)}, np.zeros(n), 0.0
+    lengths, over_periods = np.diff(grid.times), []
+    assert n <= 256  # beyond, cells are joined
+    for step in range(max(2, periods) * n):
+        for j in range(n):
+            at = (j + step) % n
+            total[j], age[j] = grid.flows[at] @ total[j], age[j] + lengths[at]
+        norms = np.array([np.linalg.norm(total[j], 2) for j in range(n)])
+        largest = max(largest, np.max(norms * np.exp(0.3 * age))) if step < 2 * n else largest
+        if step + 1 == periods * n:
+            over_periods = norms
+    assert grid.contraction(periods) == pytest.approx(max(over_periods), rel=1e-12)
+    assert grid.overshoot(0.3) == pytest.approx(largest, rel=1e-12)
