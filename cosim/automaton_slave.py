@@ -22,6 +22,7 @@ from hybrid_model.schedule.blocks import Step, Update
 from hybrid_model.simulate import ENGINES
 
 if TYPE_CHECKING:
+    from hybrid_model.schedule.joined_blocks import JoinedBlocks
     from hybrid_model.schedule.native_block import NativeBlock
 
 
@@ -70,7 +71,10 @@ class AutomatonSlave(Slave):
         self._predictable = all(port.discrete for port in ports[Kind.INPUT])
         self._starts: dict[str, float] = {}
         self._block: AutomatonBlock | NativeBlock | None = None
+        self._joined: JoinedBlocks | None = None
         self._begun = False
+        self.why_python = 'it was asked for (engine="python")'
+        """Why it runs in Python, if it does."""
 
     @property
     def variable_names(self) -> list[str]:
@@ -96,6 +100,8 @@ class AutomatonSlave(Slave):
             )
         if self._block is None:
             self._starts[name] = value
+        elif self._joined is not None:
+            self._joined.set(self.name, name, value)
         else:
             self._block.set(name, value)
 
@@ -103,7 +109,7 @@ class AutomatonSlave(Slave):
         """See `Slave.get`."""
         if name not in self._names:
             raise self.unknown(name)
-        return self._running.get(name)
+        return self._running.get(name) if self._joined is None else self._joined.get(self.name, name)
 
     def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:
         """See `Slave.start`."""
@@ -140,6 +146,7 @@ class AutomatonSlave(Slave):
                     check=lambda: checked(run()),
                 )
             except (TraceError, BuildError) as error:
+                self.why_python = str(error)
                 if self._engine == "native":
                     raise CosimError(f"{self.name} cannot run on the native engine: {error}") from error
         return AutomatonBlock(self.name, run(), span[1], predictable=self._predictable, events=events, keep=False)
@@ -150,6 +157,16 @@ class AutomatonSlave(Slave):
             self._block.run.compute_start()
         self._running.begin()
         self._begun = True
+
+    @property
+    def native_block(self) -> NativeBlock | None:
+        """What runs on the engine in C, if it does and has begun."""
+        block = self._block
+        return None if block is None or isinstance(block, AutomatonBlock) or not self._begun else block
+
+    def join(self, joined: JoinedBlocks) -> None:
+        """From now on the slave is one of those blocks: they are stepped together, and it is read and set."""
+        self._joined = joined
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
@@ -181,7 +198,7 @@ class AutomatonSlave(Slave):
 
     def close(self) -> None:
         """See `Slave.close`."""
-        self._block, self._begun = None, False
+        self._block, self._joined, self._begun = None, None, False
 
     def _require_within(self, name: str, value: float) -> None:
         low, high = self._ranges[name]

@@ -48,6 +48,8 @@ class CosimResult:
         Instants at which slaves had events of their own, in order; of masters that handle events.
     treatment : dict
         Slave -> how its events are treated, in words.
+    engine : str
+        What had the queue of events, in a sentence; of the event-exact master.
     watch : callable, optional
         Called with this result after each row.
     """
@@ -62,6 +64,7 @@ class CosimResult:
     steps: int = 0
     events: list[Event] = field(default_factory=list)
     treatment: dict[str, str] = field(default_factory=dict)
+    engine: str = ""
     watch: Watch | None = field(default=None, repr=False, compare=False)
 
     def keep(self, t: float, names: Sequence[str], values: Sequence[Any]) -> None:

@@ -286,6 +286,7 @@ def _document(result: CosimResult, compared: list[str]) -> dict[str, Any]:
         "t": result.t,
         "steps": result.steps,
         "treatment": result.treatment,
+        "engine": result.engine,
         "event_times": {name: result.event_times(name).tolist() for name in sorted({e.block for e in result.events})},
         "ticks": {f"{slave}.{clock}": result.tick_times(slave, clock).tolist() for slave, clock in clocks},
         "final": {name: value.hex() if isinstance(value, bytes) else value for name, value in result.final.items()},

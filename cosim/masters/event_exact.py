@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Curve, Given
+from cosim.masters.queues import queue_of
 from cosim.masters.start import outputs, require_times, sample_change, sample_end, start_slaves
 from cosim.masters.treatments import exactly
 from cosim.result import CosimResult, Watch
 from cosim.system import System
 from hybrid_model.errors import SchedulingError
+from hybrid_model.schedule.blocks import StiffPart
 from hybrid_model.schedule.scheduler import Scheduler
+
+if TYPE_CHECKING:
+    from hybrid_model.schedule.joined_blocks import JoinedBlocks
 
 ROUNDING = 1e-12
 """Relative rounding of the number of output intervals."""
@@ -61,8 +67,34 @@ def run_event_exact(
     """
     require_times(t_start, t_stop, output_interval, "output interval")
     _require_discrete(system)
-    changes = Changes(system, inputs or {}, t_start)
     _refuse_curves(inputs or {})
+    told = 0
+
+    def tell(result: CosimResult) -> None:
+        nonlocal told
+        # A run that is made again tells what is new in it.
+        if watch is not None and len(result.times) > told:
+            told = len(result.times)
+            watch(result)
+
+    arguments = (system, (t_start, t_stop), output_interval, record_events, inputs or {}, tell)
+    try:
+        return _run(*arguments)
+    except StiffPart:
+        return _run(*arguments, in_python="a flow is stiff, and slaves change their methods on the way one by one")
+
+
+def _run(
+    system: System,
+    span: tuple[float, float],
+    output_interval: float | None,
+    record_events: bool,
+    inputs: Mapping[str, Given],
+    watch: Watch,
+    in_python: str = "",
+) -> CosimResult:
+    t_start, t_stop = span
+    changes = Changes(system, inputs, t_start)
     treatment = {slave.name: exactly(slave) for slave in system.slaves.values()}
     result = CosimResult(t=t_start, watch=watch, treatment=treatment)
 
@@ -70,10 +102,10 @@ def run_event_exact(
         sample_change(system, result, t, system.output_names)
 
     at_events = row if record_events and output_interval is not None else None
-    scheduler = Scheduler(system.slaves, system.from_slave, t_start, watch=at_events)
-    result.ticks, result.events = scheduler.ticks, scheduler.events
     try:
         start_slaves(system, t_start, t_stop, events=True, changes=changes)
+        scheduler, result.engine = queue_of(system, span, at_events, wanted=in_python)
+        result.ticks, result.events = scheduler.ticks, scheduler.events
         scheduler.handle_events(t_start, system.slaves)
         if output_interval is not None:
             sample_end(system, result, t_start, system.output_names)
@@ -81,18 +113,18 @@ def run_event_exact(
         if scheduler.ended and output_interval is not None:
             sample_end(system, result, scheduler.ended[1], system.output_names)
         result.final = outputs(system)
+        result.t, result.steps = scheduler.t, scheduler.steps
     except SchedulingError as error:
         raise CosimError(str(error)) from error
     finally:
         system.close()
-    result.t, result.steps = scheduler.t, scheduler.steps
     if scheduler.ended:
         result.terminate(*scheduler.ended)
     return result
 
 
 def _advance(
-    scheduler: Scheduler,
+    scheduler: Scheduler | JoinedBlocks,
     system: System,
     result: CosimResult,
     t_stop: float,
@@ -114,7 +146,11 @@ def _advance(
 
 
 def _change_on_the_way(
-    scheduler: Scheduler, system: System, limit: float, changes: Changes, watch: Callable[[float], None] | None
+    scheduler: Scheduler | JoinedBlocks,
+    system: System,
+    limit: float,
+    changes: Changes,
+    watch: Callable[[float], None] | None,
 ) -> None:
     """Set what changes up to `limit` in s, each time as an event of the slaves concerned."""
     while not scheduler.ended and (due := changes.next_time(limit)) is not None:

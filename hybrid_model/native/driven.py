@@ -112,6 +112,26 @@ class Driven:
         return np.concatenate([[0.5 * (a + b), 0.5 * (b - a) or 1.0, a, last], *(row.ravel() for row in rows)])
 
 
+def given_on(
+    inputs: Inputs, driven: Driven | None, a: float, b: float, *, closed: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return what is given from outside between two breakpoints: inputs of the compiled model, and parameters.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        As functions of time.
+    driven : Driven, optional
+        Those that vary.
+    a, b : float
+        The breakpoints, in s.
+    closed : bool
+        Whether the end is part of the piece, as at the end of a run.
+    """
+    extra = np.zeros(0) if driven is None else driven.coefficients(a, b, closed=closed)
+    return np.concatenate([inputs.held, extra]), inputs.parameters_at(a)
+
+
 def drive(inputs: Inputs, span: tuple[float, float]) -> Driven:
     """Return inputs that follow functions of time from the start to the end of a span, in s.
 

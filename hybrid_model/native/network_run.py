@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.native.build.libraries import engine_library
-from hybrid_model.native.run import Ending, NativeModel, Options
+from hybrid_model.native.run import Ending, NativeModel, NativeRun, Options
 
-_INTERFACE = 2
+_INTERFACE = 3
 """Of `parts_interface` in parts_exports.c."""
 _BANKS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER, Kind.OUTPUT)
 """In the order of the engine's banks."""
@@ -134,7 +134,18 @@ def _library() -> ctypes.CDLL:
         "parts_place": (None, [network, size, pointer]),
         "parts_start": (ctypes.c_int, [network, number, number, ctypes.c_int]),
         "parts_begin": (ctypes.c_int, [network]),
+        "parts_adopt": (ctypes.c_int, [network, ctypes.c_uint32, pointer]),
+        "parts_log_instants": (None, [network]),
         "parts_advance": (ctypes.c_int, [network, number, size]),
+        "parts_approach": (ctypes.c_int, [network, number, size]),
+        "parts_next_instant": (ctypes.c_int, [network, number]),
+        "parts_handle": (ctypes.c_int, [network]),
+        "parts_receive": (ctypes.c_int, [network, ctypes.c_uint32, ctypes.c_int, size, number]),
+        "parts_look_until": (None, [network, ctypes.c_uint32, number]),
+        "parts_peek": (pointer, [network, ctypes.c_uint32, ctypes.c_int]),
+        "parts_problem": (ctypes.c_char_p, [network, ctypes.c_uint32]),
+        "parts_next_event": (number, [network]),
+        "parts_steps": (size, [network]),
         "parts_time": (number, [network]),
         "parts_take_events": (None, [network, ctypes.POINTER(_Events)]),
         "parts_end": (None, [network, ctypes.POINTER(_End)]),
@@ -192,6 +203,10 @@ class NativeNetwork:
         found: Options = _library().parts_options(self._network, group).contents
         return found
 
+    def set_options(self, group: int, options: Options) -> None:
+        """Give a group the options of another run."""
+        _library().parts_options(self._network, group)[0] = options
+
     def start(self, start: float, stop: float, *, computed: bool) -> bool:
         """Put all parts at `start`, with their start maps if `computed`; no map is evaluated beyond `stop`, in s."""
         for k, group in enumerate(self.groups):
@@ -204,9 +219,60 @@ class NativeNetwork:
         """Take what is due at the start; False if the run is over at once."""
         return bool(_library().parts_begin(self._network))
 
+    def adopt(self, part: int, run: NativeRun) -> None:
+        """Have a part go on from where a run of the same model is that has begun; `handle` begins with it."""
+        if not _library().parts_adopt(self._network, part, run.address):
+            raise ValueError(f"part {part} of the network has another model than the run that it is to go on from")
+
+    def log_instants(self) -> None:
+        """Keep of each event the time of its instant, which all that jump there share, and not what is sent.
+
+        In the place of the values of an event is whether it is the one that its part had come to that instant for.
+        """
+        _library().parts_log_instants(self._network)
+
     def advance(self, target: float, events: int) -> NetworkAdvance:
         """Go on to the target, in s, or come back earlier after about so many events."""
         return NetworkAdvance(_library().parts_advance(self._network, target, events))
+
+    def approach(self, target: float, events: int) -> NetworkAdvance:
+        """Do the same, but leave what is due at the target to `handle`, and do not bring all parts there."""
+        return NetworkAdvance(_library().parts_approach(self._network, target, events))
+
+    def next_instant(self, limit: float) -> NetworkAdvance:
+        """Go to the next instant with events, at most to `limit` in s, and leave them to `handle`; REACHED: none."""
+        return NetworkAdvance(_library().parts_next_instant(self._network, limit))
+
+    def handle(self) -> bool:
+        """Let happen what is due now; False if the run is over."""
+        return bool(_library().parts_handle(self._network))
+
+    def receive(self, part: int, kind: Kind, index: int, value: float) -> bool:
+        """Give a part a value now, for `handle` to follow from; False if the run is over."""
+        return bool(_library().parts_receive(self._network, part, _BANKS.index(kind), index, value))
+
+    def look_until(self, part: int, time: float) -> None:
+        """Say when a part is given something: it does not look beyond that time, in s."""
+        _library().parts_look_until(self._network, part, time)
+
+    def peek(self, part: int, kind: Kind, index: int) -> float | None:
+        """Return a scalar of a part as it is now; None if it cannot be computed, then `problem` says why."""
+        place = _library().parts_peek(self._network, part, _BANKS.index(kind))
+        return None if not place else float(ctypes.c_double.from_address(place + 8 * index).value)
+
+    def problem(self, part: int) -> str:
+        """Why a value of a part could not be computed."""
+        return str(_library().parts_problem(self._network, part).decode())
+
+    @property
+    def next_event(self) -> float:
+        """In s: nothing happens before; infinite if nothing is foreseen."""
+        return float(_library().parts_next_event(self._network))
+
+    @property
+    def steps(self) -> int:
+        """Steps that all parts have made."""
+        return int(_library().parts_steps(self._network))
 
     @property
     def time(self) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import enum
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,8 +15,18 @@ from hybrid_model.native.build.libraries import engine_library
 from hybrid_model.native.run import NativeRun, Record
 from hybrid_model.record.row_flows import Rows
 
-EVENT = np.dtype([("t", np.float64), ("value", np.float64), ("number", np.uint32), ("of_input", np.uint32)])
-"""An event of a part: a jump with its number, or an input with its number and the value that it got."""
+
+class Happening(enum.IntEnum):
+    """What happened to a part: it jumped, received a value over a wire, or was given one at a time that was known."""
+
+    JUMPED = 0
+    RECEIVED = 1
+    GIVEN_INPUT = 2
+    GIVEN_PARAMETER = 3
+
+
+EVENT = np.dtype([("t", np.float64), ("value", np.float64), ("number", np.uint32), ("kind", np.uint32)])
+"""An event of a part: a jump with its number, or an input or a parameter with its number and the value that it got."""
 
 
 def replayed(

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import SimulationError, TraceError
-from hybrid_model.native.driven import Driven, drive
+from hybrid_model.native.driven import Driven, drive, given_on
 from hybrid_model.native.kept_models import model_of, what_ran
 from hybrid_model.native.run import Advance, Ending, NativeRun, Options, Record
 from hybrid_model.record.arc_values import ComputedValues
@@ -26,7 +24,7 @@ STEPS_AT_ONCE = 20_000
 _STATES = 4
 """So many are few."""
 
-_FOLLOWED = "native: its maps are compiled, together with the functions of time that its inputs are."
+FOLLOWED = "native: its maps are compiled, together with the functions of time that its inputs are."
 FOR_STIFF_FLOWS = (Method.RADAU, Method.BDF)
 _STOPS = {Ending.ZENO: Stop.ZENO, Ending.BLOCKED: Stop.BLOCKED, Ending.JUMPS: Stop.JUMPS}
 
@@ -90,7 +88,7 @@ def native_run(
         stop,
         message,
         one_instant(run.time, span[0], span[0]) if tolerance is None else tolerance,
-        engine=what_ran(automaton) if driven is None else _FOLLOWED,
+        engine=what_ran(automaton) if driven is None else FOLLOWED,
         statistics=run.statistics,
     )
 
@@ -104,14 +102,18 @@ class _Driver:
     def run(self, span: tuple[float, float], record: Record) -> bool:
         """Run from the start of a span to its end; return whether the run is over before."""
         inputs, (start, end) = self._inputs, span
-        breakpoints = inputs.breakpoints_in(start, end)
-        u, p = self._outside(start, breakpoints, end)
+        ends = [*inputs.breakpoints_in(start, end), end]
+        u, p = self._outside(start, ends)
         over = not self._run.start([inputs.start(Kind.STATE), inputs.start(Kind.DISCRETE), u, p], start, end, record)
-        for k, time in enumerate(breakpoints):
+        for k, time in enumerate(ends[:-1]):
             if over or self._goes_on_to(time, take=False):
                 return True
-            self._change(*self._outside(time, breakpoints[k + 1 :], end))
+            self._change(*self._outside(time, ends[k + 1 : k + 3]))
         return over or self._goes_on_to(end, take=True)
+
+    def _outside(self, a: float, ends: list[float]) -> tuple[FloatArray, FloatArray]:
+        """Return inputs and parameters from `a` to the first of the ends of pieces that come."""
+        return given_on(self._inputs, self._driven, a, ends[0], closed=len(ends) == 1)
 
     def _goes_on_to(self, time: float, *, take: bool) -> bool:
         """Go on to a time; return whether the run is over."""
@@ -119,13 +121,6 @@ class _Driver:
         while advance is Advance.PAUSED and not (self._run.shows_stiffness and not self._run.model.stiff):
             advance = self._run.advance(time, take=take)
         return advance in (Advance.ENDED, Advance.PAUSED)
-
-    def _outside(self, a: float, later: list[float], end: float) -> tuple[FloatArray, FloatArray]:
-        """Return inputs and parameters on the piece from `a` to the first of the later breakpoints, or to the end."""
-        extra = np.zeros(0)
-        if self._driven is not None:
-            extra = self._driven.coefficients(a, later[0] if later else end, closed=not later)
-        return np.concatenate([self._inputs.held, extra]), self._inputs.parameters_at(a)
 
     def _change(self, u: FloatArray, p: FloatArray) -> None:
         for kind, values in ((Kind.INPUT, u), (Kind.PARAMETER, p)):

@@ -68,6 +68,10 @@ class Step(NamedTuple):
     terminated: Termination | None = None
 
 
+class StiffPart(Exception):
+    """The flow of a part of a network in C is stiff, and its compiled maps have no derivatives."""
+
+
 class Block(ABC):
     """A block that is stepped from event to event; the calls and their order are those of FMI.
 

@@ -18,7 +18,7 @@ from hybrid_model.schedule.blocks import Block, Step, Termination, Update
 from hybrid_model.solver import Solver
 from hybrid_model.zeno_guard import ZenoGuard
 
-_OF_THE_RUN = (Ending.ZENO, Ending.BLOCKED, Ending.JUMPS)
+OF_THE_RUN = (Ending.ZENO, Ending.BLOCKED, Ending.JUMPS)
 """Endings of a run; the others are errors of its maps or of the solver."""
 
 
@@ -46,6 +46,15 @@ class NativeBlock(Block):
     check : callable
         Called before the automaton is traced; what it raises is raised.
 
+    Attributes
+    ----------
+    automaton : Automaton
+        The same.
+    run : NativeRun
+        It on the engine.
+    clocks : tuple of (int, str)
+        Output clocks: the number of the jump that each ticks with, and its name.
+
     Raises
     ------
     TraceError
@@ -68,36 +77,40 @@ class NativeBlock(Block):
         check: Callable[[], None],
     ) -> None:
         require_supported(solver)
-        self.name, self._automaton, self._check = name, automaton, check
+        self.name, self.automaton, self._check = name, automaton, check
         layout = inputs.layout
         self._solver, self._zeno, self._states = solver, zeno, layout.sizes[Kind.STATE]
-        self._run = self._made(stiff=solver.method in FOR_STIFF_FLOWS)
-        self._jumps = len(self._run.model.jumps)
+        self.run = self._made(stiff=solver.method in FOR_STIFF_FLOWS)
+        self._jumps = len(self.run.model.jumps)
         parameters = inputs.parameters_at(span[0])
-        self._run.place([layout.start(Kind.STATE), layout.start(Kind.DISCRETE), inputs.held, parameters], *span)
+        self.run.place([layout.start(Kind.STATE), layout.start(Kind.DISCRETE), inputs.held, parameters], *span)
         self._places = {element: (kind, k) for kind in Kind for k, element in enumerate(layout.names(kind))}
-        self._clocks = tuple((clock.jump, clock.name) for clock in automaton.clocks)
+        self.clocks = tuple((clock.jump, clock.name) for clock in automaton.clocks)
         self._t, self._t_start, self._t_stop = span[0], *span
         self._predictable, self._events, self._view = predictable, events, View.START
+
+    def place(self, name: str) -> tuple[Kind, int]:
+        """Return where a scalar is: its kind, and its place in the vector of that kind."""
+        return self._places[name]
 
     def begin(self) -> None:
         """Take what is due at the start and not for others to see."""
         self._view = View.LIVE
-        if not self._run.begin(inside=not self._events):
+        if not self.run.begin(inside=not self._events):
             self._require_ending_of_the_run()
 
     def set(self, name: str, value: float) -> None:
         """See `Block.set`; states and parameters can be set as well."""
-        kind, index = self._places[name]
+        kind, index = self.place(name)
         if kind is not Kind.OUTPUT:
-            self._run.set(kind, index, float(value))
+            self.run.set(kind, index, float(value))
 
     def get(self, name: str) -> float:
         """See `Block.get`."""
-        kind, index = self._places[name]
-        value = self._run.read(self._view, kind, index)
+        kind, index = self.place(name)
+        value = self.run.read(self._view, kind, index)
         if value is None:
-            raise SimulationError(f"{self._automaton.name}: {self._run.problem}")
+            raise SimulationError(f"{self.automaton.name}: {self.run.problem}")
         return value
 
     def enter_event_mode(self) -> None:
@@ -108,8 +121,8 @@ class NativeBlock(Block):
 
     def update(self) -> Update:
         """See `Block.update`."""
-        made = self._run.update(self._t_stop, predicts=self._predictable and self._t < self._t_stop)
-        ticks = tuple(name for jump, name in self._clocks if jump == made.jump)
+        made = self.run.update(self._t_stop, predicts=self._predictable and self._t < self._t_stop)
+        ticks = tuple(name for jump, name in self.clocks if jump == made.jump)
         if made.over:
             return Update(False, ticks, terminated=self._termination())
         return Update(
@@ -124,41 +137,41 @@ class NativeBlock(Block):
             )
         advance = Advance.PAUSED
         while advance is Advance.PAUSED:
-            if self._run.shows_stiffness and not self._run.model.stiff:
+            if self.run.shows_stiffness and not self.run.model.stiff:
                 self._take_derivatives()
-            advance = self._run.step(t_next, inside=not self._events)
+            advance = self.run.step(t_next, inside=not self._events)
         there = advance in (Advance.REACHED, Advance.EVENT_AT_TARGET)
-        self._t = t_next if there else min(self._run.time, t_next)
+        self._t = t_next if there else min(self.run.time, t_next)
         event = advance in (Advance.EVENT_AT_TARGET, Advance.EVENT_BEFORE)
         return Step(self._t, event, self._termination() if advance is Advance.ENDED else None)
 
     def save(self) -> Any:
         """See `Block.save`."""
-        return self._t, self._run.save()
+        return self._t, self.run.save()
 
     def restore(self, state: Any) -> None:
         """See `Block.restore`."""
         self._t, block = state
-        self._run.restore(block)
+        self.run.restore(block)
 
     def release(self, state: Any) -> None:
         """See `Block.release`."""
 
     def _made(self, *, stiff: bool) -> NativeRun:
-        run = NativeRun(model_of(self._automaton, self._check, stiff=stiff))
+        run = NativeRun(model_of(self.automaton, self._check, stiff=stiff))
         set_options(run, self._solver, self._zeno, self._states)
         return run
 
     def _take_derivatives(self) -> None:
         """Go on from where the run is with what a method for stiff flows needs: all that evolves is laid out alike."""
-        block = self._run.save()
-        self._run = self._made(stiff=True)
-        self._run.restore(block)
+        block = self.run.save()
+        self.run = self._made(stiff=True)
+        self.run.restore(block)
 
     def _termination(self) -> Termination:
         self._require_ending_of_the_run()
-        return Termination(f"{self._automaton.name}: {self._run.message}", self._run.ending is Ending.ZENO)
+        return Termination(f"{self.automaton.name}: {self.run.message}", self.run.ending is Ending.ZENO)
 
     def _require_ending_of_the_run(self) -> None:
-        if self._run.ending not in _OF_THE_RUN:
-            raise SimulationError(f"{self._automaton.name}: {self._run.message}")
+        if self.run.ending not in OF_THE_RUN:
+            raise SimulationError(f"{self.automaton.name}: {self.run.message}")

@@ -12,15 +12,17 @@ from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.layout import layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind
-from hybrid_model.errors import SchedulingError, SimulationError, TraceError
+from hybrid_model.errors import SchedulingError, SimulationError
 from hybrid_model.native.network_run import EventColumns, NativeNetwork, NetworkAdvance, NetworkEnd
 from hybrid_model.native.run import Ending
-from hybrid_model.native.simulation import FOR_STIFF_FLOWS, fill_options, require_supported
+from hybrid_model.native.simulation import FOLLOWED, FOR_STIFF_FLOWS, fill_options, require_supported
 from hybrid_model.reference.execution import Execution
+from hybrid_model.schedule.blocks import StiffPart
 from hybrid_model.schedule.event_store import EventStore
 from hybrid_model.schedule.network_arrays import Network
 from hybrid_model.schedule.network_events import NetworkEvents
 from hybrid_model.schedule.network_run import NetworkRun
+from hybrid_model.schedule.outside import Given, Outside
 from hybrid_model.schedule.part_table import PartTable, table_of, table_of_arrays
 from hybrid_model.schedule.progress import Progress, Told
 from hybrid_model.schedule.rebuilt_arcs import EventTable, RebuiltArcs
@@ -34,6 +36,8 @@ STEPS_AHEAD = 1
 """Of the solver, in one look ahead of a part: what lies beyond is looked at when the time comes, for an input may have
 changed by then."""
 _STOPS = {Ending.ZENO: Stop.ZENO, Ending.BLOCKED: Stop.BLOCKED, Ending.JUMPS: Stop.JUMPS}
+
+_RAN = "native: its maps are compiled."
 
 Keep = Callable[[EventColumns, float], None]
 """What is done with the events up to a time in s."""
@@ -70,25 +74,24 @@ def native_network_run(
     Raises
     ------
     TraceError
-        If a part's maps cannot be traced, its inputs follow time, or the engine in C does not step as the solver asks.
+        If a part's maps or functions of time cannot be traced, or the engine in C does not step as the solver asks.
     BuildError
         If there is no compiler, or it fails.
     """
     require_supported(solver)
-    for part, run in runs.items():
-        if run.inputs.vary or run.inputs.breakpoints_in(*span):
-            raise TraceError(f"what {part} is given from outside follows time, which networks do in Python only.")
+    given = {k: one for k, run in enumerate(runs.values()) if (one := Given.of(run.inputs, span)) is not None}
     stiff = solver.method in FOR_STIFF_FLOWS
     try:
-        return _run_once(network, runs, span, solver, zeno, events_to, progress, stiff=stiff)
+        return _run_once(network, runs, given, span, solver, zeno, events_to, progress, stiff=stiff)
     except StiffPart:
         # From the start, with the derivatives that another method needs: so the first run is as all later ones.
-        return _run_once(network, runs, span, solver, zeno, events_to, progress, stiff=True)
+        return _run_once(network, runs, given, span, solver, zeno, events_to, progress, stiff=True)
 
 
 def _run_once(
     network: Composition | Network,
     runs: Mapping[str, Execution],
+    given: Mapping[int, Given],
     span: tuple[float, float],
     solver: Solver,
     zeno: ZenoGuard,
@@ -100,16 +103,16 @@ def _run_once(
     if isinstance(network, Network):
         table = table_of_arrays(network, *span, stiff=stiff)
     else:
-        table = table_of(network, runs, stiff=stiff)
+        table = table_of(network, runs, given, stiff=stiff)
     store = EventStore(table.about, table.width, None if events_to is None else Path(events_to))
-    told = Progress(span, wanted=progress)
+    told, outside = Progress(span, wanted=progress), Outside(given)
 
     def keep(events: EventColumns, t: float) -> None:
         store.keep(events)
         told.note(t, len(events.t))
 
     try:
-        outcome, ends = run_table(table, span, solver, zeno, keep)
+        outcome, ends = run_table(table, outside, span, solver, zeno, keep)
     except StiffPart:
         store.discard()
         raise
@@ -126,7 +129,7 @@ def _run_once(
             return automaton, Inputs(layout_of(automaton))
         return starts[part].automaton, starts[part].inputs
 
-    events = EventTable(columns, len(table.names))
+    events = EventTable(columns, len(table.names), outside)
     how = outcome.stop, outcome.message
     arcs = RebuiltArcs(
         table, events, (span[0], outcome.t), solver, zeno, *how, lambda: started(table, span, solver, zeno), declared
@@ -136,7 +139,7 @@ def _run_once(
         outcome.stop,
         outcome.message,
         outcome.t,
-        "native: its maps are compiled.",
+        FOLLOWED if any(one.driven for one in given.values()) else _RAN,
         lambda: NetworkEvents.of_columns(columns, **table.about),
         lambda name: table.values_of(ends, name),
     )
@@ -156,12 +159,8 @@ class InterruptedNetwork(KeyboardInterrupt):
         self.events = events
 
 
-class StiffPart(Exception):
-    """The flow of a part is stiff, and its compiled maps have no derivatives."""
-
-
 def run_table(
-    table: PartTable, span: tuple[float, float], solver: Solver, zeno: ZenoGuard, keep: Keep
+    table: PartTable, outside: Outside, span: tuple[float, float], solver: Solver, zeno: ZenoGuard, keep: Keep
 ) -> tuple[NetworkOutcome, list[dict[Kind, FloatArray]]]:
     """Run a network from the start to the end of a span, and return how it ended, and the states of all parts then.
 
@@ -169,6 +168,8 @@ def run_table(
     ----------
     table : PartTable
         The parts.
+    outside : Outside
+        What they are given.
     span : (float, float)
         In s.
     solver : Solver
@@ -190,11 +191,9 @@ def run_table(
         If a part asks for event iterations without end.
     """
     network = started(table, span, solver, zeno)
-    advance = NetworkAdvance.GOING if network.begin() else network.end.how
+    outside.begin(network)
     try:
-        while advance is NetworkAdvance.GOING:
-            keep(network.take_events(), network.time)
-            advance = network.advance(span[1], EVENTS_AT_ONCE)
+        advance = _advanced(network, outside, span[1], keep)
     finally:
         keep(network.take_events(), network.time)
     if advance is NetworkAdvance.STIFF:
@@ -205,6 +204,35 @@ def run_table(
     else:
         outcome = _outcome(table, network.end)
     return outcome, [{kind: network.read(k, kind) for kind in (Kind.STATE, Kind.DISCRETE)} for k in groups]
+
+
+def _advanced(network: NativeNetwork, outside: Outside, end: float, keep: Keep) -> NetworkAdvance:
+    """Run from breakpoint to breakpoint of what is given."""
+    events = 0
+
+    def take() -> None:
+        nonlocal events
+        taken = network.take_events()
+        events += len(taken.t)
+        keep(taken, network.time)
+
+    def come(go: Callable[[float, int], NetworkAdvance], target: float) -> NetworkAdvance:
+        advance = NetworkAdvance.GOING
+        while advance is NetworkAdvance.GOING:
+            advance = go(target, EVENTS_AT_ONCE)
+            take()
+        return advance
+
+    if not network.begin():
+        return network.end.how
+    take()
+    for time, changes in outside.times():
+        if (advance := come(network.approach, time)) is not NetworkAdvance.REACHED:
+            return advance
+        if not all(outside.give(network, part, k, events) for part, k in changes) or not network.handle():
+            return network.end.how
+        take()
+    return come(network.advance, end)
 
 
 def started(table: PartTable, span: tuple[float, float], solver: Solver, zeno: ZenoGuard) -> NativeNetwork:

@@ -20,6 +20,7 @@ from hybrid_model.native.run import NativeModel
 from hybrid_model.reference.execution import Execution
 from hybrid_model.reference.first_look import checked
 from hybrid_model.schedule.network_arrays import Network
+from hybrid_model.schedule.outside import Given
 
 ROWS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
 """What a part begins with, in the order of its rows."""
@@ -118,7 +119,9 @@ class PartTable:
         return np.repeat(np.arange(len(first) - 1, dtype=np.uint32), first[1:] - first[:-1])
 
 
-def table_of(network: Composition, executions: Mapping[str, Execution], *, stiff: bool) -> PartTable:
+def table_of(
+    network: Composition, executions: Mapping[str, Execution], given: Mapping[int, Given], *, stiff: bool
+) -> PartTable:
     """Put the parts of a composition into groups.
 
     Parameters
@@ -127,33 +130,36 @@ def table_of(network: Composition, executions: Mapping[str, Execution], *, stiff
         Whose parts meet only at events.
     executions : mapping
         Part -> its run at the start.
+    given : mapping
+        Number of a part -> what it is given from outside, where that changes.
     stiff : bool
         Whether flows may need a method for stiff ones.
 
     Raises
     ------
     TraceError
-        If a part's maps cannot be traced, or its inputs from outside follow time.
+        If a part's maps cannot be traced.
     BuildError
         If there is no compiler, or it fails.
     """
     parts = list(network.parts)
-    models = {part: _model(executions[part], stiff=stiff) for part in parts}
+    own = [given.get(k) for k in range(len(parts))]
+    models = {part: _model(executions[part], one, stiff=stiff) for part, one in zip(parts, own, strict=True)}
     # Automata of other names may have the same code, which is in memory once.
     number: dict[int, int] = {}
     group_of = np.array([number.setdefault(models[part].pointer, len(number)) for part in parts], np.uint32)
-    members: list[list[str]] = [[] for _ in number]
-    for part, group in zip(parts, group_of, strict=True):
-        members[group].append(part)
+    members: list[list[int]] = [[] for _ in number]
+    for k, group in enumerate(group_of):
+        members[group].append(k)
     row_of = np.zeros(len(parts), np.uint32)
     for group in range(len(number)):
         row_of[group_of == group] = np.arange(len(members[group]), dtype=np.uint32)
     signals, wires = _wired(network, parts, group_of, len(number))
     groups = tuple(
-        PartGroup(models[names[0]], signals[group], _stacked([executions[part] for part in names]))
-        for group, names in enumerate(members)
+        PartGroup(models[parts[of[0]]], signals[group], _stacked([_begun(executions[parts[k]], own[k]) for k in of]))
+        for group, of in enumerate(members)
     )
-    automata = tuple(network.parts[names[0]] for names in members)
+    automata = tuple(network.parts[parts[of[0]]] for of in members)
     return PartTable(network.name, parts, automata, groups, group_of, row_of, wires, computed=False)
 
 
@@ -209,18 +215,17 @@ def _input(template: Automaton, name: str) -> int:
     return next((int(place.at.start) for place in places if place.variable.name == name), 0)
 
 
-def _model(run: Execution, *, stiff: bool) -> NativeModel:
-    return model_of(run.automaton, lambda: checked(run), stiff=stiff)
+def _model(run: Execution, given: Given | None = None, *, stiff: bool) -> NativeModel:
+    return model_of(run.automaton, lambda: checked(run), stiff=stiff, driven=given.driven if given else None)
 
 
-def _stacked(runs: Sequence[Execution]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    columns = (
-        [run.x for run in runs],
-        [run.z for run in runs],
-        [run.inputs.held for run in runs],
-        [run.p for run in runs],
-    )
-    x, z, u, p = (np.array(rows, np.float64).reshape(len(runs), -1) for rows in columns)
+def _begun(run: Execution, given: Given | None) -> tuple[FloatArray, ...]:
+    """Return what a part begins with, in the order of `ROWS`."""
+    return (run.x, run.z, *((run.inputs.held, run.p) if given is None else given.piece(run.t, 0)))
+
+
+def _stacked(rows: Sequence[tuple[FloatArray, ...]]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    x, z, u, p = (np.array(column, np.float64).reshape(len(rows), -1) for column in zip(*rows, strict=True))
     return x, z, u, p
 
 

@@ -14,7 +14,7 @@ from hybrid_model.declare.layout import layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.native.network_run import NO_JUMP, EventColumns, NativeNetwork
-from hybrid_model.native.replay import EVENT, replayed
+from hybrid_model.native.replay import EVENT, Happening, replayed
 from hybrid_model.native.run import NativeRun
 from hybrid_model.native.simulation import fill_options
 from hybrid_model.record.arc import HybridArc
@@ -22,6 +22,7 @@ from hybrid_model.record.arc_values import ReceivedValues
 from hybrid_model.record.row_flows import RowFlows, RowJumps
 from hybrid_model.record.run_record import RunRecord
 from hybrid_model.scales import one_instant
+from hybrid_model.schedule.outside import Outside
 from hybrid_model.schedule.part_table import ROWS, PartTable
 from hybrid_model.solver import Solver
 from hybrid_model.stop import Stop
@@ -37,10 +38,12 @@ class EventTable:
         All of them, in order.
     parts : int
         How many parts there are.
+    outside : Outside
+        What they were given.
     """
 
-    def __init__(self, events: EventColumns, parts: int) -> None:
-        self.events, self._parts = events, parts
+    def __init__(self, events: EventColumns, parts: int, outside: Outside) -> None:
+        self.events, self._parts, self._outside = events, parts, outside
 
     @functools.cached_property
     def _rows(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -53,7 +56,7 @@ class EventTable:
         return order[first[part] : first[part + 1]]
 
     def of_part(self, table: PartTable, part: int) -> npt.NDArray[np.void]:
-        """Return what happened to a part: its jumps, and what it received over its wires (see `EVENT`)."""
+        """Return what happened to a part: its jumps, and what it received and was given (see `EVENT`)."""
         events, (order, first) = self.events, table.arrivals
         own = self.rows(part)
         own = own[events.jump[own] != NO_JUMP]
@@ -65,10 +68,12 @@ class EventTable:
         values = events.values[received, np.repeat(table.wires.signals[wires], lengths)]
         found = np.zeros(len(own) + len(received), EVENT)
         rows = np.concatenate([own, received])
-        found["t"], found["of_input"][len(own) :] = events.t[rows], 1
+        found["t"], found["kind"][len(own) :] = events.t[rows], Happening.RECEIVED
         found["number"] = np.concatenate([events.jump[own], inputs])
         found["value"][len(own) :] = values
-        found = found[np.lexsort((found["of_input"], rows))]
+        given, after = self._outside.of_part(part)
+        found, places = np.concatenate([given, found]), np.concatenate([after - 0.5, rows])
+        found = found[np.lexsort((found["kind"], places))]
         # A reception may have been sent some rounding before the receiver's own last event.
         found["t"] = np.maximum.accumulate(found["t"])
         return found
@@ -143,7 +148,9 @@ class RebuiltArcs(Mapping[str, HybridArc]):
         if self._stop is not Stop.HORIZON:
             end = max([self._span[0], *happened["t"]])
         rows, before = replayed(run, starts, (self._span[0], end), happened)
-        read = ReceivedValues(automaton, inputs, _received(starts[2], self._span[0], happened, before))
+        read = ReceivedValues(
+            automaton, inputs, _received(starts[2][: len(inputs.held)], self._span[0], happened, before)
+        )
         flows = [replace(flow, z=np.append(flow.z, j)) for j, flow in enumerate(RowFlows(rows))]
         given = self._solver.event_tolerance
         tolerance = one_instant(end, self._span[0], self._span[0]) if given is None else given
@@ -157,7 +164,7 @@ def _received(
     """Return the hybrid times from which on inputs had other values, and those."""
     received = [(start, 0, held)]
     for event, j in zip(happened, before, strict=True):
-        if event["of_input"] and held[event["number"]] != event["value"]:
+        if event["kind"] == Happening.RECEIVED and held[event["number"]] != event["value"]:
             held = held.copy()
             held[event["number"]] = event["value"]
             received.append((float(event["t"]), int(j), held))

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from strangers import BACKWARD, BEYOND, FAILS, ITERATES, PASTS, REPEATS, STALLS, THRICE, WELL
 
-import cosim.masters.event_exact
+import cosim.masters.queues
 import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.errors import CosimError
@@ -64,7 +64,7 @@ def test_a_fault_is_named_and_without_its_guard_it_is_not(behaviour, sentence, p
     monkeypatch.setattr(FmuCalls, "__call__", counted)
     module = without(guard, sys.modules[place], monkeypatch)
     if place == SCHEDULER:
-        monkeypatch.setattr(cosim.masters.event_exact, "Scheduler", module.Scheduler)
+        monkeypatch.setattr(cosim.masters.queues, "Scheduler", module.Scheduler)
     else:
         monkeypatch.setattr(FmuSlave, "_carry_on", module.FmuSlave._carry_on)
     try:

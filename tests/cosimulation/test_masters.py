@@ -110,12 +110,17 @@ def test_the_start_values_run_through_a_chain_whatever_its_order():
 
 def test_only_the_slave_that_fires_and_its_receivers_are_stepped():
     """50 ramps that nobody listens to and that do not fire cost one step each, for the stop time."""
-    idle = [(f"idle{k}", Ramp(rate=0.01)) for k in range(50)]
-    system = System(slaves(("a", Ramp()), ("b", Relay()), *idle), {"b.received": "a.sent"})
-    result = run_event_exact(system, 9.5)
-    assert len(result.tick_times("a", "ticks")) == 9
-    # a and b: one step each per event, and one for the stop time.
-    assert result.steps <= 50 + 2 * (9 + 1)
+    results = []
+    for count, engine in ((0, "auto"), (50, "auto"), (50, "python")):
+        idle = [AutomatonSlave(f"idle{k}", Ramp(rate=0.01), engine=engine) for k in range(count)]
+        pair = [AutomatonSlave("a", Ramp(), engine=engine), AutomatonSlave("b", Relay(), engine=engine)]
+        results.append(run_event_exact(System([*pair, *idle], {"b.received": "a.sent"}), 9.5))
+        assert len(results[-1].tick_times("a", "ticks")) == 9
+    alone, together, plain = (result.steps for result in results)
+    assert together - alone == 50
+    # a and b: one step each per event, and one for the stop time; where looks ahead end on the way, one more each.
+    assert plain <= 50 + 2 * (9 + 1)
+    assert together <= 50 + 4 * (9 + 1)
 
 
 def test_simultaneous_events_that_rounding_separates_are_handled_at_one_instant():

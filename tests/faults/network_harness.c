@@ -102,7 +102,7 @@ static void run_network(Task *task)
         wiring->groups[i] = (uint32_t)pick(&dice, GROUPS);
     wire(wiring, &dice, model.n_inputs);
     Schedule *schedule = schedule_create(GROUPS, models, n_sent, sent, wiring->n_parts, wiring->groups);
-    schedule->keeps_log = true;
+    schedule->keeps = LOG_SIGNALS;
     schedule->wires = (Wires){wiring->first, wiring->signals, wiring->targets, wiring->inputs};
     for (size_t group = 0; group < GROUPS; group++) {
         schedule->groups[group].engine->options.look_ahead_steps = 1.0 + (double)pick(&dice, 4);

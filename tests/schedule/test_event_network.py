@@ -111,33 +111,6 @@ def test_cost_per_event_does_not_grow_with_the_number_of_parts(monkeypatch):
     assert large <= 2.0 * small
 
 
-def test_inputs_from_outside_are_known_ahead():
-    class Follower(hm.HybridAutomaton):
-        """Sends its state each time it has moved by one; moves with what comes from outside and from its neighbour."""
-
-        u = hm.Input(0.0)
-        other = hm.Input(0.0, discrete=True)
-        x = hm.State(0.0, output=True)
-        sent = hm.DiscreteState(0.0, output=True)
-
-        def flow_map(self, s):
-            return {"x": s.u + 0.1 * s.other}
-
-        transitions = (hm.Jump("send", lambda self, s: abs(s.x - s.sent) - 1.0, lambda self, s: {"sent": s.x}),)
-
-    network = hm.Composition(
-        "pair", {"left": Follower(), "right": Follower()}, {"left.other": "right.sent", "right.other": "left.sent"}
-    )
-    inputs = {
-        "left.u": hm.Signal(lambda t: 1.0 if t < 2.5 else -1.0, [2.5]),
-        "right.u": lambda t: np.cos(t),
-    }
-    compare(network, 9.0, engine="python", inputs=inputs)
-    assert "follows time" in hm.simulate_network(network, 1.0, inputs=inputs).engine
-    with pytest.raises(hm.SimulationError, match=r"pair cannot run on the native engine: .*left"):
-        hm.simulate_network(network, 1.0, inputs=inputs, engine="native")
-
-
 @ENGINES
 def test_a_part_whose_jumps_accumulate_ends_the_run_by_name(engine):
     network = hm.product("two", BouncingBall("slow", e=0.95), BouncingBall("fast"))

@@ -112,10 +112,10 @@ class Follower(hm.HybridAutomaton):
 
 def test_a_flow_that_turns_out_to_be_stiff_goes_on_with_a_method_for_that():
     slave = started(Follower(), "native", events=False)
-    saved, explicit = slave.save(), slave._block._run
+    saved, explicit = slave.save(), slave._block.run
     for t, t_next in ((0.0, 0.5), (0.5, 1.0)):
         slave.step(t, t_next)
-    run = slave._block._run
+    run = slave._block.run
     assert run is not explicit
     assert run.statistics.jacobians > 0
     # An explicit method is stable up to steps of 6e-6 s, 160 000 of them; after 20 000 the block hears what they show.

@@ -1,4 +1,6 @@
 /* What a process that has loaded the engine as a library may call to run networks part by part: see schedule.h. */
+#include <math.h>
+
 #include "schedule.h"
 
 #if defined(_WIN32)
@@ -10,7 +12,7 @@
 #endif
 
 /* Changes with every change of what follows. */
-#define PARTS_INTERFACE 2
+#define PARTS_INTERFACE 3
 
 /* Events since they were taken last, in columns. */
 typedef struct {
@@ -38,7 +40,18 @@ EXPORT void parts_wires(Schedule *schedule, const uint64_t first[], const uint32
 EXPORT void parts_place(Schedule *schedule, size_t group, const double *const values[]);
 EXPORT int parts_start(Schedule *schedule, double start, double stop, int computed);
 EXPORT int parts_begin(Schedule *schedule);
+EXPORT int parts_adopt(Schedule *schedule, uint32_t part, Engine *engine);
+EXPORT void parts_log_instants(Schedule *schedule);
 EXPORT int parts_advance(Schedule *schedule, double target, size_t events);
+EXPORT int parts_approach(Schedule *schedule, double target, size_t events);
+EXPORT int parts_next_instant(Schedule *schedule, double limit);
+EXPORT int parts_handle(Schedule *schedule);
+EXPORT int parts_receive(Schedule *schedule, uint32_t part, int bank, size_t index, double value);
+EXPORT void parts_look_until(Schedule *schedule, uint32_t part, double time);
+EXPORT const double *parts_peek(Schedule *schedule, uint32_t part, int bank);
+EXPORT const char *parts_problem(Schedule *schedule, uint32_t part);
+EXPORT double parts_next_event(const Schedule *schedule);
+EXPORT size_t parts_steps(const Schedule *schedule);
 EXPORT double parts_time(const Schedule *schedule);
 EXPORT void parts_take_events(Schedule *schedule, NetworkEvents *events);
 EXPORT void parts_end(Schedule *schedule, NetworkEnd *end);
@@ -58,7 +71,7 @@ Schedule *parts_create(size_t n_groups, const Model *const models[], const size_
 {
     Schedule *schedule = schedule_create(n_groups, models, n_signals, signals, n_parts, groups);
     if (schedule)
-        schedule->keeps_log = true;
+        schedule->keeps = LOG_SIGNALS;
     return schedule;
 }
 
@@ -89,9 +102,84 @@ int parts_begin(Schedule *schedule)
     return schedule_begin(schedule);
 }
 
+/* A part goes on from where an engine of the same model is, which has begun; false if its group has another model. */
+int parts_adopt(Schedule *schedule, uint32_t part, Engine *engine)
+{
+    Engine *own = schedule_at(schedule, part);
+    if (own->model != engine->model)
+        return 0;
+    engine_save(engine, own->block);
+    engine_use_block(own, own->block);
+    schedule_touch(schedule, part);
+    return 1;
+}
+
+void parts_log_instants(Schedule *schedule)
+{
+    schedule->keeps = LOG_INSTANTS;
+    schedule->log.width = 1;
+}
+
 int parts_advance(Schedule *schedule, double target, size_t events)
 {
     return (int)schedule_advance(schedule, target, events);
+}
+
+int parts_approach(Schedule *schedule, double target, size_t events)
+{
+    return (int)schedule_approach(schedule, target, events);
+}
+
+/* Goes to the next instant with events up to the limit, where they wait for parts_handle; REACHED if there is none. */
+int parts_next_instant(Schedule *schedule, double limit)
+{
+    double instant = schedule->t;
+    schedule->enough = SIZE_MAX;
+    if (!schedule_next_instant(schedule, limit, &instant))
+        return (int)schedule->end;
+    schedule->t = instant;
+    schedule_touch_due(schedule);
+    return (int)(schedule->n_due > 0 ? SCHEDULE_GOING : SCHEDULE_REACHED);
+}
+
+/* What is due now, by what has come from outside too. */
+int parts_handle(Schedule *schedule)
+{
+    return schedule_iterate(schedule, schedule->t);
+}
+
+int parts_receive(Schedule *schedule, uint32_t part, int bank, size_t index, double value)
+{
+    return schedule_receive(schedule, part, (Bank)bank, index, value);
+}
+
+/* A part does not look beyond a time at which it is given something; in s. */
+void parts_look_until(Schedule *schedule, uint32_t part, double time)
+{
+    schedule_at(schedule, part)->status->stop_time = time;
+}
+
+/* The values of a bank of a part as they are now; NULL if they cannot be computed. */
+const double *parts_peek(Schedule *schedule, uint32_t part, int bank)
+{
+    return engine_values(schedule_peek(schedule, part, schedule->t), VIEW_LIVE, (Bank)bank);
+}
+
+const char *parts_problem(Schedule *schedule, uint32_t part)
+{
+    return engine_problem(schedule_at(schedule, part));
+}
+
+/* In s; where a look ahead has ended it is earlier. */
+double parts_next_event(const Schedule *schedule)
+{
+    const Queue *queue = &schedule->queue;
+    return queue->count > 0 ? queue->times[queue->parts[0]] : INFINITY;
+}
+
+size_t parts_steps(const Schedule *schedule)
+{
+    return schedule->steps;
 }
 
 double parts_time(const Schedule *schedule)

@@ -11,10 +11,12 @@
 #define EXPORT
 #endif
 
-/* What happened: a jump with its number, or an input (`of_input`) with its number that got a value. */
+/* What happened: a jump with its number, or an input or a parameter that got a value: over a wire, or from outside at a
+   time that was known, beyond which no flow is looked at. */
+enum { JUMPED, RECEIVED, GIVEN_INPUT, GIVEN_PARAMETER };
 typedef struct {
     double t, value;
-    uint32_t number, of_input;
+    uint32_t number, kind;
 } ReplayEvent;
 
 EXPORT int run_replay_begin(Engine *engine, const double *const values[], double start, double stop, int record);
@@ -53,15 +55,21 @@ static bool jump(Engine *engine, size_t number)
    breakpoints included.  Returns how many events there were before something failed, one more than all if nothing did. */
 size_t run_replay(Engine *engine, size_t count, const ReplayEvent events[], uint64_t jumps_before[], double end)
 {
+    size_t given = 0;
     for (size_t k = 0; k < count; k++) {
         const ReplayEvent *event = &events[k];
+        while (given < count && (given < k || events[given].kind < GIVEN_INPUT))
+            given++;
+        engine->options.barrier = given < count ? events[given].t : INFINITY;
         if (!flow_to(engine, event->t))
             return k;
         jumps_before[k] = engine->rows[ROWS_OF_JUMPS].count - 1;
-        if (event->of_input)
-            engine_set(engine, BANK_INPUT, event->number, event->value);
+        if (event->kind != JUMPED)
+            engine_set(engine, event->kind == GIVEN_PARAMETER ? BANK_PARAMETER : BANK_INPUT, event->number,
+                       event->value);
         else if (!jump(engine, event->number))
             return k;
     }
+    engine->options.barrier = INFINITY;
     return flow_to(engine, end) ? count + 1 : count;
 }

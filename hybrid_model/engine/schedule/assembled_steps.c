@@ -77,8 +77,7 @@ static bool go_on(Assembled *assembled)
     bool at_target = schedule->n_due == 0 || instant >= target ||
                      target - instant <= schedule_instant(schedule, schedule->due[0], instant);
     move(assembled, at_target ? target : instant);
-    for (size_t k = 0; k < schedule->n_due; k++)
-        schedule_touch(schedule, schedule->due[k]);
+    schedule_touch_due(schedule);
     return true;
 }
 

@@ -25,13 +25,8 @@ static uint32_t owner(const Assembly *of, Bank bank, size_t index, size_t *own)
 
 static void set(Assembled *assembled, uint32_t part, Bank bank, size_t index, double value)
 {
-    Schedule *schedule = assembled->schedule;
-    if (!schedule_bring(schedule, part, schedule->t, part)) {
+    if (!schedule_receive(assembled->schedule, part, bank, index, value))
         assembled_over(assembled);
-        return;
-    }
-    engine_set(schedule_at(schedule, part), bank, index, value);
-    schedule_touch(schedule, part);
 }
 
 void assembled_set(Assembled *assembled, Bank bank, size_t index, double value)

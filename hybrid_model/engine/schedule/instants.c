@@ -68,9 +68,26 @@ static bool send(Schedule *schedule, uint32_t i, double t, const double *values,
     return true;
 }
 
+bool schedule_receive(Schedule *schedule, uint32_t i, Bank bank, size_t index, double value)
+{
+    if (!schedule_bring(schedule, i, schedule->t, i))
+        return false;
+    engine_set(schedule_at(schedule, i), bank, index, value);
+    schedule_touch(schedule, i);
+    return true;
+}
+
 static bool keep(Schedule *schedule, uint32_t i, double t, uint32_t jump, const double *signals, size_t n)
 {
-    return !schedule->keeps_log || log_event(&schedule->log, t, i, jump, signals, n) ||
+    double own = schedule->parts[i].due;
+    if (schedule->keeps == LOG_NOTHING || (schedule->keeps == LOG_INSTANTS && jump == NO_JUMP))
+        return true;
+    if (schedule->keeps == LOG_INSTANTS) {
+        t = schedule->t;
+        signals = &own;
+        n = 1;
+    }
+    return log_event(&schedule->log, t, i, jump, signals, n) ||
            schedule_refuse(schedule, i, "leaves no memory for its event at t = %.12g s, after %zu others.", t,
                            schedule->log.count);
 }
@@ -129,6 +146,7 @@ bool schedule_update(Schedule *schedule, double t)
                                t);
     if (!jump(schedule, i, t, &again))
         return false;
+    part->due = false;
     if (again)
         schedule_touch(schedule, i);
     return true;
@@ -138,7 +156,7 @@ bool schedule_close(Schedule *schedule)
 {
     for (size_t k = 0; k < schedule->n_touched; k++) {
         Part *part = &schedule->parts[schedule->touched[k]];
-        part->touched = false;
+        part->touched = part->due = false;
         part->iterations = 0;
         part->t_event = part->t;
         schedule_predict(schedule, schedule->touched[k]);

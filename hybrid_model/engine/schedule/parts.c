@@ -115,6 +115,7 @@ bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event)
     Part *part = &schedule->parts[i];
     Engine *engine = schedule_at(schedule, i);
     Advance advance = ADVANCE_PAUSED;
+    schedule->steps++;
     while (advance == ADVANCE_PAUSED && !needs_another_method(schedule, i))
         advance = engine_advance(engine, target, EVENTS_STOP);
     if (advance == ADVANCE_PAUSED)
@@ -152,18 +153,20 @@ static void predict(Schedule *schedule, uint32_t i, double steps)
 {
     Part *part = &schedule->parts[i];
     double next;
+    const Engine *engine = schedule_at(schedule, i);
+    /* Where a value comes from outside, the part is asked anew. */
+    double limit = fmin(schedule->stop, engine->status->stop_time);
     schedule->work++;
     part->unsure = part->far = false;
-    if (part->t >= schedule->stop) {
+    if (part->t >= limit) {
         queue_remove(&schedule->queue, i);
         return;
     }
-    const Engine *engine = schedule_at(schedule, i);
     bool ahead = look_ahead(schedule, i, steps, &next);
     if (needs_another_method(schedule, i))
         return;
     Prediction found = (Prediction)engine->status->prediction;
-    if (ahead && found == PREDICTION_QUIET && next >= schedule->stop) {
+    if (ahead && found == PREDICTION_QUIET && next >= limit) {
         part->halts = 0;
         queue_remove(&schedule->queue, i);
         return;
@@ -179,7 +182,7 @@ static void predict(Schedule *schedule, uint32_t i, double steps)
        rounding by rounding one would not get on. */
     double end = ahead ? next : part->t, instant = fmax(schedule_instant(schedule, i, end), engine_time_ulp(end));
     double beyond = end + ldexp(instant, part->halts < MOST_HALTS ? (int)part->halts++ : MOST_HALTS);
-    queue_put(&schedule->queue, i, fmin(beyond, schedule->stop));
+    queue_put(&schedule->queue, i, fmin(beyond, limit));
 }
 
 void schedule_predict(Schedule *schedule, uint32_t i)

@@ -156,6 +156,14 @@ bool schedule_next_instant(Schedule *schedule, double limit, double *instant)
     return true;
 }
 
+void schedule_touch_due(Schedule *schedule)
+{
+    for (size_t k = 0; k < schedule->n_due; k++) {
+        schedule->parts[schedule->due[k]].due = true;
+        schedule_touch(schedule, schedule->due[k]);
+    }
+}
+
 /* Brings a part to the target, with the events that it has there. */
 static bool finish(Schedule *schedule, uint32_t i, double target)
 {
@@ -171,6 +179,7 @@ static bool finish(Schedule *schedule, uint32_t i, double target)
                                    "stopped at t = %.12g s for an event that it had not announced, on the way to "
                                    "%.12g s.",
                                    part->t, target);
+        part->due = true;
         schedule_touch(schedule, i);
         if (!schedule_iterate(schedule, target))
             return false;
@@ -178,21 +187,43 @@ static bool finish(Schedule *schedule, uint32_t i, double target)
     return true;
 }
 
-ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t work)
+/* Handles events up to the target; those at the target are pending then if they are to be left. */
+static ScheduleEnd come(Schedule *schedule, double target, bool leaves)
 {
-    schedule->enough = schedule->work + work;
     double instant = schedule->t;
-    while (schedule->end == SCHEDULE_GOING && schedule->finished == 0) {
+    while (schedule->end == SCHEDULE_GOING) {
         if (schedule->work >= schedule->enough)
             return SCHEDULE_GOING;
         if (!schedule_next_instant(schedule, target, &instant))
-            return schedule->end;
-        if (schedule->n_due == 0 && schedule->work < schedule->enough)
             break;
-        for (size_t k = 0; k < schedule->n_due; k++)
-            schedule_touch(schedule, schedule->due[k]);
+        if (schedule->n_due == 0 && schedule->work < schedule->enough)
+            return SCHEDULE_REACHED;
+        schedule_touch_due(schedule);
+        if (leaves && schedule->n_due > 0 &&
+            target - instant <= schedule_instant(schedule, schedule->due[0], instant))
+            return SCHEDULE_REACHED;
         if (!schedule_iterate(schedule, instant))
-            return schedule->end;
+            break;
+    }
+    return schedule->end;
+}
+
+ScheduleEnd schedule_approach(Schedule *schedule, double target, size_t work)
+{
+    schedule->enough = schedule->work + work;
+    ScheduleEnd end = come(schedule, target, true);
+    if (end == SCHEDULE_REACHED)
+        schedule->t = target;
+    return end;
+}
+
+ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t work)
+{
+    schedule->enough = schedule->work + work;
+    if (schedule->finished == 0) {
+        ScheduleEnd end = come(schedule, target, false);
+        if (end != SCHEDULE_REACHED)
+            return end;
     }
     for (; schedule->end == SCHEDULE_GOING && schedule->finished < schedule->n_parts; schedule->finished++)
         if (!finish(schedule, (uint32_t)schedule->finished, target))

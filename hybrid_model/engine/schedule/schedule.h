@@ -42,6 +42,7 @@ typedef struct {
     uint32_t group, member;
     uint32_t iterations, stalls;
     bool touched, pending;
+    bool due;                     /* its own event has come; it has not had its turn yet */
     bool unsure;                  /* its place in the queue is where its look ahead ended, no event */
     bool far;                     /* it has looked ahead as far as it may */
     uint32_t halts;               /* looks ahead in a row that have found that its run ends */
@@ -69,6 +70,10 @@ typedef struct {
     size_t count, capacity, width;
 } EventLog;
 
+/* LOG_INSTANTS: jumps alone, with the times of their instants, which all that jump there share; in the place of signals
+   whether a jump is the event that the part had come to that instant for. */
+typedef enum { LOG_NOTHING, LOG_SIGNALS, LOG_INSTANTS } LogKind;
+
 /* STIFF: a part's flow has shown that its model needs what it has not, a method for stiff flows. */
 typedef enum { SCHEDULE_GOING, SCHEDULE_REACHED, SCHEDULE_ENDED, SCHEDULE_REFUSED, SCHEDULE_STIFF } ScheduleEnd;
 
@@ -94,7 +99,7 @@ typedef struct {
     uint32_t *due;
     size_t n_due;
     EventLog log;
-    bool keeps_log;
+    LogKind keeps;
     PartHook hook;
     void *hook_context;
     uint32_t acting, last_jump;   /* the part whose turn it is, and the jump that it has taken */
@@ -103,6 +108,7 @@ typedef struct {
     double *values;               /* of the signals of one part, and which have changed */
     bool *changed;
     size_t work, enough;          /* events and looks ahead so far */
+    size_t steps;                 /* of parts so far */
     size_t finished;              /* parts that have been brought to the present target */
     ScheduleEnd end;
     uint32_t culprit;             /* the part that has ended the run */
@@ -149,6 +155,8 @@ bool schedule_signals(Schedule *schedule, uint32_t i, double *values);
 void schedule_touch(Schedule *schedule, uint32_t i);
 /* Brings a part to t; `sender` sends to it. */
 bool schedule_bring(Schedule *schedule, uint32_t i, double t, uint32_t sender);
+/* A part is given a value from outside, now. */
+bool schedule_receive(Schedule *schedule, uint32_t i, Bank bank, size_t index, double value);
 /* One event iteration of the first part that is pending: at most one jump, and what it sends. */
 bool schedule_update(Schedule *schedule, double t);
 /* The instant is over: all that were touched look ahead. */
@@ -184,6 +192,11 @@ bool schedule_wake(Schedule *schedule);
 bool schedule_begin(Schedule *schedule);
 /* The next instant with events up to `limit`; the parts that have them (`due`) are brought there. */
 bool schedule_next_instant(Schedule *schedule, double limit, double *instant);
+/* Those parts are to be asked. */
+void schedule_touch_due(Schedule *schedule);
+/* Handles events before the target, as schedule_advance does; what is due at the target is left for whatever comes from
+   outside there, and the parts are not brought there. */
+ScheduleEnd schedule_approach(Schedule *schedule, double target, size_t work);
 /* Handles events up to the target and brings all parts there; comes back earlier after about so many events and looks
    ahead. */
 ScheduleEnd schedule_advance(Schedule *schedule, double target, size_t work);
