@@ -6,6 +6,8 @@ import sys
 import time
 from collections.abc import Callable
 
+from hybrid_model.progress import duration
+
 Told = bool | Callable[[float, int], None]
 
 
@@ -39,15 +41,9 @@ class Progress:
         self._told, spent = now, now - self._began
         start, end = self._span
         done = (t - start) / (end - start) if end > start else 1.0
-        left = f", about {_duration(spent * (1.0 - done) / done)} left" if done > 0.0 else ""
+        left = f", about {duration(spent * (1.0 - done) / done)} left" if done > 0.0 else ""
         print(
             f"t = {t:.6g} of {end:.6g} s: {self._events} events, {self._events / spent:.3g} a second{left}",
             file=sys.stderr,
             flush=True,
         )
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"

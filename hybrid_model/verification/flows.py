@@ -44,6 +44,8 @@ class FlowCheck:
         Where violations go.
     method : str
         One of `METHODS`.
+    note : callable
+        Called once for each step from a sample to the next, and once more for the sets at its start if time goes on.
 
     Raises
     ------
@@ -51,12 +53,14 @@ class FlowCheck:
         If the method is none of these.
     """
 
-    def __init__(self, subject: Subject, slack: Slack, findings: Findings, method: str) -> None:
+    def __init__(
+        self, subject: Subject, slack: Slack, findings: Findings, method: str, note: Callable[[], object]
+    ) -> None:
         if method not in METHODS:
             raise SimulationError(f"verify was given method = {method!r}: the methods are {', '.join(METHODS)}.")
         self._subject = subject
         self._slack, self._findings = slack, findings
-        self._method = method
+        self._method, self._note = method, note
         automaton = subject.automaton
         self._guards = subject.guards if automaton.priority is Priority.JUMP else []
 
@@ -70,6 +74,8 @@ class FlowCheck:
         if t[last] > t[first]:
             for k in range(first, last + 1):
                 self._sets_at(k, flows_on=bool(t[k] < t[last]))
+                if k < last:
+                    self._note()
         for k in range(first, last):
             self._time_events(k)
         self._along(first, last)
@@ -146,7 +152,9 @@ class FlowCheck:
             fits_upto = next((k for k in range(first, last) if not self._arrives(k + 1, path)), last)
             for k in range(first, fits_upto):
                 self._between(k, path)
+                self._note()
         for k in range(fits_upto, last):
+            self._note()
             try:
                 path = self._path(k, k + 1)
             except FlowMapError as error:

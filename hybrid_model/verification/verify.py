@@ -20,6 +20,7 @@ from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.calls import explained
 from hybrid_model.declare.signals import InputValue
 from hybrid_model.errors import DataError
+from hybrid_model.progress import Counted, Wanted
 from hybrid_model.record.arc import HybridArc
 from hybrid_model.record.samples import Samples
 from hybrid_model.verification.flows import FlowCheck
@@ -38,6 +39,7 @@ def verify(
     starts: Mapping[str, npt.ArrayLike] | None = None,
     tolerances: Tolerances | None = None,
     method: str = "LSODA",
+    progress: Wanted = None,
 ) -> Verification:
     """Check whether samples are a hybrid arc of an automaton, by the definition of Goebel, Sanfelice and Teel.
 
@@ -66,6 +68,9 @@ def verify(
         How exact the samples are.
     method : str
         Integrator of ``scipy.integrate.solve_ivp`` for the flow map, by its name; one that the simulation has not used.
+    progress : bool or callable, optional
+        Whether to tell on stderr how far it is and how long it takes, once it has taken two seconds: by default where
+        that is a terminal; or who is told, ``progress(done, total)``.
 
     Returns
     -------
@@ -96,13 +101,17 @@ def verify(
     usable = _finite(subject, findings)
     _hybrid_time(subject.samples, findings)
     flows = list(_flows(subject.samples, usable))
-    flow_check = FlowCheck(subject, slack, findings, method)
-    for first, last in flows:
-        flow_check.check(first, last)
     jumps = np.flatnonzero((np.diff(subject.samples.j) == 1) & usable[:-1] & usable[1:])
-    jump_check = JumpCheck(subject, slack, findings)
-    for k in jumps:
-        jump_check.check(int(k))
+    t = subject.samples.t
+    pieces = sum((last - first) * (1 + int(t[last] > t[first])) for first, last in flows) + len(jumps)
+    with Counted(f"verifying {automaton.name}", pieces, progress) as work:
+        flow_check = FlowCheck(subject, slack, findings, method, work.note)
+        for first, last in flows:
+            flow_check.check(first, last)
+        jump_check = JumpCheck(subject, slack, findings)
+        for k in jumps:
+            jump_check.check(int(k))
+            work.note()
     lengths = [subject.samples.t[last] - subject.samples.t[first] for first, last in flows]
     return Verification(
         automaton.name, findings.violations(), len(subject.samples), int(np.sum(np.array(lengths) > 0.0)), len(jumps)

@@ -2,7 +2,11 @@
 
 import ast
 import dataclasses
+import io
+import itertools
 import pathlib
+import re
+import sys
 
 import fmpy
 import fmpy.util
@@ -664,3 +668,36 @@ def test_a_run_from_other_starts_and_parameters_is_one_with_them_only():
     assert any("leads to v" in violation.message for violation in hm.verify(BouncingBall(), arc).violations)
     with pytest.raises(DeclarationError, match=r"^starts: BouncingBall .*gravity"):
         hm.verify(BouncingBall(), arc, starts={"gravity": 9.0})
+
+
+def test_how_far_it_is_is_told_once_it_takes_long(monkeypatch, capsys):
+    arc = hm.simulate(BouncingBall(), 1.0)
+    # A clock of which each look takes half a second.
+    ticks = itertools.count(0.0, 0.5)
+    monkeypatch.setattr("hybrid_model.progress.time.monotonic", lambda: next(ticks))
+    told = []
+    assert hm.verify(BouncingBall(), arc, progress=lambda done, total: told.append((done, total))).ok
+    done, totals = zip(*told, strict=True)
+    # Two pieces for each step between samples, one for each jump: two seconds are silent, then each second one tells.
+    assert set(totals) == {2 * (len(arc.t) - 1 - len(arc.jumps)) + len(arc.jumps)}
+    assert done == tuple(range(4, totals[0] + 1, 2))
+    assert hm.verify(BouncingBall(), arc, progress=True).ok
+    lines = capsys.readouterr().err.splitlines()
+    assert re.fullmatch(r"verifying BouncingBall: \d+%, about \d+ s left", lines[0])
+    assert len(lines) == len(told)
+    assert hm.verify(BouncingBall(), arc).ok
+    assert capsys.readouterr().err == ""
+
+
+def test_on_a_terminal_one_line_is_kept_up_to_date_and_cleared(monkeypatch):
+    terminal = io.StringIO()
+    terminal.isatty = lambda: True
+    ticks = itertools.count(0.0, 0.5)
+    monkeypatch.setattr("hybrid_model.progress.time.monotonic", lambda: next(ticks))
+    monkeypatch.setattr(sys, "stderr", terminal)
+    arc = hm.simulate(BouncingBall(), 1.0)
+    assert hm.verify(BouncingBall(), arc).ok
+    told = terminal.getvalue()
+    assert "\n" not in told
+    assert told.startswith("\rverifying BouncingBall: ")
+    assert re.search(r"\r +\r$", told)
