@@ -7,7 +7,7 @@ import pytest
 from drawing import examples
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from random_scenarios import TRIGGERS, random_scenario
+from random_scenarios import FURTHER, KNOWN_AHEAD, TRIGGERS, random_scenario
 
 import hybrid_model as hm
 from hybrid_model import consensus
@@ -19,6 +19,13 @@ CHANNELS = {
 }
 KINDS = sorted(set(TRIGGERS) - {"continuous"})
 """Agents that see each other's states all the time are no network of parts."""
+DRAWN = {
+    "seed": st.integers(0, 10**6),
+    "trigger": st.sampled_from(KINDS),
+    "channel": st.sampled_from(sorted(CHANNELS)),
+    "weights": st.sampled_from(sorted({*KNOWN_AHEAD, *FURTHER})),
+}
+"""Graph, switching and numbers come with the seed."""
 
 
 def happened(run):
@@ -46,24 +53,27 @@ def assert_alike(network, t_end, **options):
             np.testing.assert_allclose(other.at(name, apart), arc.at(name, apart), rtol=0.0, atol=1e-9)
 
 
-def assert_scenario_alike(seed, trigger, channel, t_end):
+def assert_scenario_alike(seed, trigger, channel, weights, t_end):
     ideal = trigger in ("relative", "girard", "self-triggered") or channel == "ideal"
-    scenario = random_scenario(seed, trigger, channel=None if ideal else CHANNELS[channel], stop_time=t_end)
+    if trigger == "self-triggered" and weights not in KNOWN_AHEAD:
+        weights = "sine"
+    given = None if ideal else CHANNELS[channel]
+    scenario = random_scenario(seed, trigger, channel=given, weights=weights, stop_time=t_end)
     assert_alike(consensus.closed_loop(scenario), t_end)
 
 
 # Few, and short: each is compiled, and the scheduler in Python takes some ten milliseconds an event.
 @examples(2, 3)
-@given(seed=st.integers(0, 10**6), trigger=st.sampled_from(KINDS), channel=st.sampled_from(sorted(CHANNELS)))
-def test_random_scenarios(seed, trigger, channel):
-    assert_scenario_alike(seed, trigger, channel, 0.7)
+@given(**DRAWN)
+def test_random_scenarios(seed, trigger, channel, weights):
+    assert_scenario_alike(seed, trigger, channel, weights, 0.7)
 
 
 @pytest.mark.long
 @settings(max_examples=60, deadline=None)
-@given(seed=st.integers(0, 10**6), trigger=st.sampled_from(KINDS), channel=st.sampled_from(sorted(CHANNELS)))
-def test_many_random_scenarios(seed, trigger, channel):
-    assert_scenario_alike(seed, trigger, channel, 2.0)
+@given(**DRAWN)
+def test_many_random_scenarios(seed, trigger, channel, weights):
+    assert_scenario_alike(seed, trigger, channel, weights, 2.0)
 
 
 NEVER = 1e9

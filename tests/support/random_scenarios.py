@@ -43,7 +43,7 @@ def random_scenario(seed, trigger, *, channel=None, weights=None, stop_time=4.0)
     channel : dict, optional
         Table of the channel.
     weights : str, optional
-        "constant" or "gated-sine"; default: drawn.
+        "constant", "gated-sine", or one of `FURTHER`; default: one of the first two is drawn.
     stop_time : float
         In s.
     """
@@ -62,9 +62,7 @@ def random_scenario(seed, trigger, *, channel=None, weights=None, stop_time=4.0)
             "initial": rng.uniform(-1.0, 1.0, agents).tolist(),
             "gain": rng.uniform(0.5, 1.5),
         },
-        "weights": {"kind": "constant", "value": rng.uniform(0.1, 1.5, count).tolist()}
-        if kind == "constant"
-        else gated(rng, count),
+        "weights": {"constant": constant, "gated-sine": gated, **FURTHER}[kind](rng, count),
         "trigger": {"kind": trigger, **TRIGGERS[trigger](rng)},
     }
     if rng.random() < 0.5:
@@ -74,6 +72,48 @@ def random_scenario(seed, trigger, *, channel=None, weights=None, stop_time=4.0)
     if channel:
         entries["channel"] = channel
     return read_scenario(entries)
+
+
+def constant(rng, count):
+    """The table of constant weights."""
+    return {"kind": "constant", "value": rng.uniform(0.1, 1.5, count).tolist()}
+
+
+def sine(rng, count):
+    """The table of weights that swing."""
+    numbers = {"mean": (0.2, 1.2), "depth": (0.0, 1.0), "rate": (0.5, 6.0), "phase": (-3.0, 3.0)}
+    return {"kind": "sine", **{key: rng.uniform(*ends, count).tolist() for key, ends in numbers.items()}}
+
+
+def square(rng, count):
+    """The table of weights that alternate."""
+    numbers = {"high": (0.5, 1.5), "low": (0.0, 0.5), "gate_rate": (1.0, 6.0), "duty_percent": (20.0, 90.0)}
+    return {"kind": "square", **{key: rng.uniform(*ends, count).tolist() for key, ends in numbers.items()}}
+
+
+def piecewise(rng, count):
+    """The table of weights that step together and, once in two, repeat."""
+    rows = int(rng.integers(1, 6))
+    starts = np.cumsum(rng.uniform(0.1, 0.6, rows)).tolist()
+    cycle = {"cycle": starts[-1] - starts[0] + rng.uniform(0.1, 0.6)} if rng.random() < 0.5 else {}
+    return {"kind": "piecewise", "starts": starts, "values": rng.uniform(0.0, 1.5, (count, rows)).tolist(), **cycle}
+
+
+def sampled(rng, count):
+    """The table of weights that run straight between samples and, once in two, repeat."""
+    rows, repeats = int(rng.integers(2, 7)), bool(rng.random() < 0.5)
+    times, values = [0.0, *np.cumsum(rng.uniform(0.1, 0.6, rows - 1)).tolist()], rng.uniform(0.0, 1.5, (count, rows))
+    if repeats:
+        values[:, -1] = values[:, 0]
+    else:
+        times[-1] = 99.0  # They must cover the run.
+    return {"kind": "sampled", "times": times, "values": values.tolist(), "repeat": repeats}
+
+
+FURTHER = {"sine": sine, "square": square, "piecewise": piecewise, "sampled": sampled}
+"""Kind of weight -> its table."""
+KNOWN_AHEAD = ("constant", "gated-sine", "sine")
+"""Weights that self-triggered agents can compute ahead."""
 
 
 def gated(rng, count):

@@ -17,20 +17,14 @@ from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.schedule.links import Whole
 
-_SEE_ALIKE = (
-    *(TriggerKind.STATIC, TriggerKind.DYNAMIC, TriggerKind.MIXED, TriggerKind.RELATIVE, TriggerKind.GIRARD),
-    *(TriggerKind.SAMPLED, TriggerKind.PERIODIC),
-)
-"""Laws that know the number of an agent's edges, and nothing else of them."""
-
 
 def agent_network(scenario: Scenario) -> hm.Network | hm.Composition:
     """Return what `hm.simulate_network` runs for a scenario.
 
     Agents with equally many neighbours are copies where they differ in start values and in numbers of their edges
     alone, those of weights, of a switching topology and of a channel: then no object is made for any of them. With
-    weights from tables or functions, and with laws that know their edges, the network is composed of its agents one by
-    one.
+    weights of several kinds, several functions of time, and tables whose rows do not begin together, the network is
+    composed of its agents one by one.
 
     Parameters
     ----------
@@ -70,28 +64,27 @@ def agent_network(scenario: Scenario) -> hm.Network | hm.Composition:
 
 
 def _are_copies(scenario: Scenario) -> bool:
+    waveforms = scenario.weights.waveforms
     return (
-        scenario.trigger.kind in _SEE_ALIKE
-        and isinstance(scenario.switching, (NoSwitching, SwitchingCycle, SwitchingSequence))
-        and len({wave.automaton for wave in scenario.weights.waveforms}) == 1
-        and _is_by_number(scenario.weights.waveforms[0].automaton)
+        isinstance(scenario.switching, (NoSwitching, SwitchingCycle, SwitchingSequence))
+        and len({wave.automaton for wave in waveforms}) == 1
+        and issubclass(waveforms[0].automaton, EdgeAutomaton)
+        and waveforms[0].automaton.are_columns(waveforms)
     )
-
-
-def _is_by_number(automaton: type[hm.Automaton]) -> bool:
-    """Whether each parameter of the automaton of an agent's weights has one number for each edge."""
-    return issubclass(automaton, EdgeAutomaton) and automaton.of.__func__ is EdgeAutomaton.of.__func__  # type: ignore[attr-defined]
 
 
 def _numbers(scenario: Scenario, receivers: Whole, senders: Whole) -> dict[str, FloatArray]:
     """Return the numbers of weights, switching and channel, one or one row for each link."""
     waveforms, switching, channel = scenario.weights.waveforms, scenario.switching, scenario.channel
-    found = {
-        f"weights.{name}": np.repeat(column, 2) for name, column in waveforms[0].automaton.columns(waveforms).items()
-    }
+    columns = waveforms[0].automaton.columns(waveforms).items()
+    numbers = {name: np.repeat(np.moveaxis(column, -1, 0), 2, axis=0) for name, column in columns}
+    found = {f"weights.{name}": column for name, column in numbers.items()}
     if isinstance(switching, (SwitchingCycle, SwitchingSequence)):
         active = np.array(masks(switching.active, range(len(waveforms))), dtype=np.float64)
-        found["switching.active"] = np.repeat(active.T, 2, axis=0)
+        numbers["active"] = found["switching.active"] = np.repeat(active.T, 2, axis=0)
+    if scenario.trigger.kind is TriggerKind.SELF_TRIGGERED:
+        # The law knows the same of its edges, and in which graphs they are.
+        found |= {f"trigger.{name}": column for name, column in numbers.items()}
     if not channel.ideal:
         pairs = zip((receivers + 1).tolist(), (senders + 1).tolist(), strict=True)
         seeds = [link_seeds(channel.seed, receiver, [sender])[0] for receiver, sender in pairs]

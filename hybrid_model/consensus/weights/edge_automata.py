@@ -31,8 +31,13 @@ class EdgeAutomaton(hm.HybridAutomaton):
         """The weights."""
 
     @classmethod
+    def are_columns(cls, waveforms: Sequence[Any]) -> bool:
+        """Whether automata of as many of these edges differ in their `columns` alone."""
+        return True
+
+    @classmethod
     def columns(cls, waveforms: Sequence[Any]) -> dict[str, Any]:
-        """Parameters out of the data of the edges, which have attributes of these names."""
+        """Parameters out of the data of the edges, the edges along the last axis."""
         return {key: np.array([getattr(waveform, key) for waveform in waveforms]) for key in waveforms[0].numbers}
 
     @classmethod

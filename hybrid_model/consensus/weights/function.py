@@ -103,6 +103,11 @@ class FunctionWeights(RowAutomaton, EdgeAutomaton):
         return {"weights": np.stack([FunctionCarrier(function).value(s.t) for function in self.functions])}
 
     @classmethod
+    def are_columns(cls, waveforms: Sequence[Any]) -> bool:
+        """Whether all are one function."""
+        return len(set(waveforms)) == 1
+
+    @classmethod
     def of(cls, waveforms: Sequence[Any]) -> Self:
         """The functions, and the kinks of all; ScenarioError if these have no common period."""
         clocks = [waveform.carrier.clock for waveform in waveforms if waveform.carrier.clock is not None]

@@ -49,20 +49,26 @@ class TabulatedWeights(RowAutomaton, EdgeAutomaton):
         return {"weights": on_line(s.value, s.slope, s.since, s.t)}
 
     @classmethod
-    def of(cls, waveforms: Sequence[Any]) -> Self:
-        """One table of the rows of all; ScenarioError if they have no common period."""
+    def are_columns(cls, waveforms: Sequence[Any]) -> bool:
+        """Whether all have one clock; else each agent has the rows of its own edges."""
+        return len({waveform.clock for waveform in waveforms}) == 1
+
+    @classmethod
+    def columns(cls, waveforms: Sequence[Any]) -> dict[str, Any]:
+        """Values and slopes in the rows of all; ScenarioError if they have no common period."""
         clock = common_clock([waveform.clock for waveform in waveforms])
         begins = np.array(clock.starts)
         # A row is looked up at its middle, where rounding of its beginning cannot pick the neighbouring one.
         lengths = clock.lengths()
         middles = begins + np.where(np.isfinite(lengths), lengths, 1.0) / 2
         values, slopes = zip(*(waveform.lines(begins, middles) for waveform in waveforms), strict=True)
-        return cls(
-            starts=clock.starts,
-            period=clock.period or 0.0,
-            values=np.stack(values, axis=1),
-            slopes=np.stack(slopes, axis=1),
-        )
+        return {"values": np.stack(values, axis=1), "slopes": np.stack(slopes, axis=1)}
+
+    @classmethod
+    def of(cls, waveforms: Sequence[Any]) -> Self:
+        """One table of the rows of all; ScenarioError if they have no common period."""
+        clock = common_clock([waveform.clock for waveform in waveforms])
+        return cls(starts=clock.starts, period=clock.period or 0.0, **cls.columns(waveforms))
 
 
 def common_clock(clocks: Sequence[RowClock]) -> RowClock:
