@@ -30,9 +30,18 @@ class RunFiles:
     system : System
     t_stop : float
         Time in s that the run is to reach.
+
+    Raises
+    ------
+    DataError
+        Before the run, if a picture is to be PGF and there is no TeX.
     """
 
     def __init__(self, options: argparse.Namespace, system: System, t_stop: float) -> None:
+        if options.plot is not None and options.plot.suffix.lower() == ".pgf":
+            from hybrid_model.plots.tex import tex_system
+
+            tex_system()
         self._options, self._arrays, self._t_stop = options, system.arrays, t_stop
         single = next(iter(system.slaves)) if len(system.slaves) == 1 else None
         # One FMU by itself has the columns that fmpy and fmusim write.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -28,12 +29,19 @@ def draw(
         Where to write it; the suffix chooses the format.
     show : bool
         Whether to open a window.
+
+    Raises
+    ------
+    DataError
+        For PGF where there is no TeX that can write it.
     """
     # matplotlib is imported by whoever draws.
     import matplotlib.pyplot as plt
 
     from hybrid_model.plots.style import JOURNAL, TIME
+    from hybrid_model.plots.tex import measured_by_tex
 
+    form = path.suffix[1:].lower() if path is not None else ""
     numbers = {name: values for name, values in signals.items() if values and not isinstance(values[0], (str, bytes))}
     count = max(min(len(numbers), MOST_AXES), 1)
     with plt.rc_context(JOURNAL):
@@ -46,8 +54,8 @@ def draw(
         axes[0, 0].set_title(title)
         axes[-1, 0].set_xlabel(TIME)
         if path is not None:
-            with replacing(path) as part:
-                figure.savefig(part, format=path.suffix[1:].lower())
+            with replacing(path) as part, measured_by_tex() if form == "pgf" else nullcontext():
+                figure.savefig(part, format=form)
         if show:
             plt.show()
         plt.close(figure)

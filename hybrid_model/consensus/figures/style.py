@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from hybrid_model.consensus.certificates.forms import Form
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.errors import DataError
 from hybrid_model.plots import COLORS, JOURNAL
+from hybrid_model.plots.tex import measured_by_tex, tex_system
 
 __all__ = [
     "COLUMN",
@@ -150,10 +150,8 @@ def require_formats(formats: Sequence[str]) -> None:
     for name in formats:
         if name not in FORMATS:
             raise DataError(f"figures are written as {', '.join(FORMATS)}, and not as {name!r}: give one of these.")
-    if "pgf" in formats and not any(map(shutil.which, ("xelatex", "pdflatex", "lualatex"))):
-        raise DataError(
-            "a figure as PGF needs TeX, and there is no xelatex, pdflatex or lualatex: install one, or leave pgf out."
-        )
+    if "pgf" in formats:
+        tex_system()
 
 
 def save_figures(
@@ -185,8 +183,7 @@ def save_figures(
     # The font's own time stamp is none of the reader's business; the subsetter warns about it for every figure.
     logging.getLogger("fontTools").setLevel(logging.ERROR)
     written: list[Path] = []
-    tex = next((name for name in ("xelatex", "pdflatex", "lualatex") if shutil.which(name)), "xelatex")
-    with plt.rc_context({**JOURNAL, "pgf.texsystem": tex}):
+    with plt.rc_context(JOURNAL):
         for name, draw in figures.items():
             written += _save(draw(), folder / name, formats)
     return written
@@ -203,6 +200,10 @@ def _save(figure: Figure, path: Path, formats: Sequence[str]) -> list[Path]:
             engine.execute(figure)
             figure.set_layout_engine(None)
         for file, name in zip(written, formats, strict=True):
-            figure.savefig(file, metadata=FORMATS[name])
+            if name == "pgf":
+                with measured_by_tex():
+                    figure.savefig(file)
+            else:
+                figure.savefig(file, metadata=FORMATS[name])
     plt.close(figure)
     return written

@@ -1,6 +1,8 @@
 """Figures that say what they show: bounds that hold, two events that stay two, up to 100 agents, every form of file."""
 
 import shutil
+import subprocess
+from functools import partial
 from itertools import pairwise
 
 import matplotlib.pyplot as plt
@@ -9,17 +11,19 @@ import pytest
 from PIL import Image
 
 import hybrid_model as hm
-from hybrid_model.consensus import closed_loop, load_scenario
+from hybrid_model.consensus import closed_loop, load_scenario, run_report
 from hybrid_model.consensus.certificates.certify import certify
 from hybrid_model.consensus.certificates.forms import Form
 from hybrid_model.consensus.figures import animation
 from hybrid_model.consensus.figures.animation import save_animation
 from hybrid_model.consensus.figures.details import MOST_AXES, plot_gaps_against_bounds
 from hybrid_model.consensus.figures.run import certified_curves, plot_broadcasts, plot_edge_norm
-from hybrid_model.consensus.figures.style import PAGE, height_of, row_step, save_figures
+from hybrid_model.consensus.figures.style import PAGE, height_of, in_column, row_step, save_figures
 from hybrid_model.consensus.runs.report import edge_norm
 from hybrid_model.errors import DataError
 from hybrid_model.plots import JOURNAL, plot_raster
+
+TEX = list(filter(shutil.which, ("xelatex", "pdflatex", "lualatex")))
 
 
 @pytest.fixture(scope="module")
@@ -100,16 +104,39 @@ def test_many_agents_have_one_entry_in_a_legend(ax):
     assert MOST_AXES < 30
 
 
-@pytest.mark.parametrize("form", ["png", "pdf", "svg", "pgf"])
+@pytest.mark.parametrize("form", ["png", "pdf", "svg"])
 def test_forms_of_figures(form, tmp_path):
-    if form == "pgf" and not any(map(shutil.which, ("xelatex", "pdflatex", "lualatex"))):
-        with pytest.raises(DataError, match=r"a figure as PGF needs TeX.*: install one, or leave pgf out"):
-            save_figures({"a": plt.figure}, tmp_path, [form])
-        return
-    (path,) = save_figures({"a": plt.figure}, tmp_path, [form])
+    (path,) = save_figures({"a": lambda: plt.subplots()[0]}, tmp_path, [form])
     assert path.name == f"a.{form}"
-    start = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml", "pgf": b"%% Creator"}[form]
+    start = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}[form]
     assert path.read_bytes().startswith(start)
+
+
+@pytest.mark.skipif(not TEX, reason="apt-get install texlive-latex-recommended texlive-pictures: figures as PGF")
+def test_figures_as_pgf_go_into_a_document(paper, tmp_path):
+    scenario, arc, _ = paper
+    draw = in_column(partial(plot_broadcasts, scenario, run_report(scenario, arc).event_times))
+    (path,) = save_figures({"a": draw}, tmp_path, ["pgf"])
+    assert "agent 4" in path.read_text()
+    (tmp_path / "b.tex").write_text(
+        r"\documentclass{article}\usepackage{pgf}\def\mathdefault#1{#1}\begin{document}\input{a.pgf}\end{document}"
+    )
+    call = [TEX[0], "-interaction=nonstopmode", "-halt-on-error", "b.tex"]
+    subprocess.run(call, cwd=tmp_path, check=True, capture_output=True, timeout=120)
+    assert (tmp_path / "b.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_without_tex_there_is_no_pgf(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(DataError, match=r"a figure as PGF needs TeX.*: install one, or leave pgf out"):
+        save_figures({"a": plt.figure}, tmp_path, ["pgf"])
+    # One that ends at once, as TeX does where a package is missing.
+    (tmp_path / "pdflatex").write_text("#!/bin/sh\necho '! LaTeX Error: File pgf.sty not found.'\nexit 1\n")
+    (tmp_path / "pdflatex").chmod(0o755)
+    # A preamble of its own: matplotlib keeps the TeX that has measured before.
+    says = "cannot be written, since pdflatex says: .+[.] Remedy: install LaTeX's package pgf"
+    with plt.rc_context({"pgf.preamble": "% none"}), pytest.raises(DataError, match=says):
+        save_figures({"a": lambda: plt.subplots()[0]}, tmp_path, ["pgf"])
 
 
 def test_other_forms_are_refused(tmp_path):
@@ -148,3 +175,15 @@ def test_films_of_other_kinds_are_refused(paper, tmp_path, monkeypatch):
     for name, sentence in (("a.avi", "a film is a .gif or an .mp4"), ("a.mp4", "needs ffmpeg.*or write a .gif")):
         with pytest.raises(DataError, match=sentence):
             save_animation(scenario, arc, tmp_path / name)
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="apt-get install ffmpeg: films as MP4")
+def test_a_film_as_mp4_has_its_frames(paper, tmp_path):
+    scenario, arc, _ = paper
+    path = save_animation(scenario, arc.restrict(t=(0.0, 0.4)), tmp_path / "a.mp4", seconds=1.0, frames_per_second=5)
+    raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-"]
+    call = [shutil.which("ffmpeg"), "-v", "error", "-i", str(path), *raw]
+    shown = subprocess.run(call, check=True, capture_output=True, timeout=120).stdout
+    frames = np.frombuffer(shown, dtype=np.uint8).reshape(5, 320, 720, 3).astype(int)[:, :, :250]
+    glow = [int((np.abs(f - [0xE6, 0x9F, 0x00]).sum(axis=2) < 60).sum()) for f in frames]
+    assert glow[2] > glow[1] + 20
