@@ -148,7 +148,7 @@ def test_a_thousand_self_triggered_agents_broadcast_as_the_dynamic_law_has_them(
             "network": {
                 "agents": 1000,
                 "graph": "ring",
-                "initial": {"draw": "uniform", "low": -1.0, "high": 1.0, "seed": 3},
+                "initial": initial,
             },
             "weights": {"kind": "gated-sine", "gate_rate": 4.0, "sine_rate": 5.0, "duty_percent": 50.0, "phase": 0.0},
             "trigger": {"kind": trigger, "threshold": 0.1, "decay": 0.1},
