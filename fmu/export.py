@@ -23,7 +23,6 @@ from hybrid_model.declare.arguments import require_automaton
 from hybrid_model.declare.calls import explained
 from hybrid_model.declare.real_numbers import is_real
 from hybrid_model.native.kept_models import kept_trace
-from hybrid_model.native.networks.network import NetworkTrace
 
 KINDS = ("cs", "me")
 """Co-Simulation and Model Exchange."""
@@ -107,8 +106,7 @@ def export_fmu(
     code = fmu_code(traced, variables, _TOKEN, chosen)
     listed = tuple(source_names(version)) if sources else ()
     description = Description(traced, variables, _TOKEN, version, chosen, stop_time, step_size, listed)
-    # A run of a large network in Python takes longer than all else together.
-    content = archive_members(description, code, references=not isinstance(traced, NetworkTrace))
+    content = archive_members(description, code)
     # The token ties description and code together: it changes when either does.
     written = [content["modelDescription.xml"], code.encode(), *map(Path.read_bytes, [*runtime, *_headers()])]
     token = hashlib.sha256(b"".join(written)).hexdigest()[: len(_TOKEN)]

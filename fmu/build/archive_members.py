@@ -26,19 +26,16 @@ _ASSETS = {
 }
 
 
-def archive_members(description: Description, model_code: str, *, references: bool = True) -> dict[str, bytes]:
+def archive_members(description: Description, model_code: str) -> dict[str, bytes]:
     """Return the members of an FMU's archive, all but those below ``binaries/``.
 
     Parameters
     ----------
     description : Description
-        What is exported; with `sources` the C sources are members.
+        What is exported; with `sources` the C sources are members. If it has a stop time, the automaton is run to it
+        for reference results; one that cannot run from its start values has none.
     model_code : str
         The generated C file.
-    references : bool
-        Whether the automaton is run to the stop time for reference results, if there is a stop time. An automaton
-        that cannot run from its start values has none.
-
     Returns
     -------
     dict of str to bytes
@@ -58,7 +55,7 @@ def archive_members(description: Description, model_code: str, *, references: bo
     if description.sources:
         members |= source_members(model_code, description.identifier, description.fmi)
     stop_time = description.stop_time
-    if references and stop_time is not None and stop_time > 0.0:
+    if stop_time is not None and stop_time > 0.0:
         members |= _references(description, stop_time)
     related = [
         name for name in (f"{FOLDER}/results.csv", NOTE, "documentation/licenses/license.txt") if name in members

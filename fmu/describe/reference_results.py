@@ -33,6 +33,8 @@ first and after its last jump there: an importer without event mode has only the
 communication point. To be expected: the same jumps, times equal to 1e-7 s, continuous states to 1e-8 of their size.
 """
 _NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
+_MOST_COLUMNS, _MOST_VALUES = 100, 100_000
+"""Of a table of results: those of large networks would be many times larger than the FMU."""
 _DIGITS = 12
 """Of the values: more than the run is exact to, and few enough for the same bytes from other C libraries."""
 
@@ -51,7 +53,7 @@ def reference_results(description: Description, stop_time: float) -> dict[str, b
     -------
     dict of str to bytes
         Manifest, experiment, and results: a row for each step of the experiment, and two for the instant of a jump,
-        before and after it. Empty if the automaton has nothing that an FMU shows.
+        before and after it. Empty if the automaton has nothing that an FMU shows, or its results are a large table.
 
     Raises
     ------
@@ -59,12 +61,15 @@ def reference_results(description: Description, stop_time: float) -> dict[str, b
         If the run fails.
     """
     shown = _shown(description)
-    if not shown:
+    if not shown or len(shown) > _MOST_COLUMNS:
         return {}
     arc = hm.simulate(description.automaton, stop_time)
     end = float(arc.t[-1])
     step = description.proposed_step or round_step(stop_time)
-    results = _results(arc, _grid(arc, end, step), shown)
+    grid = _grid(arc, end, step)
+    if len(shown) * (len(grid) + len(arc.jumps)) > _MOST_VALUES:
+        return {}
+    results = _results(arc, grid, shown)
     experiment = _experiment(description, end, step)
     related = {
         "experiments.xml": (
