@@ -18,6 +18,8 @@ from fmu.importer.values import UnfitError, Value, exact, parsed, require_within
 from hybrid_model.scales import ROUNDINGS
 from hybrid_model.schedule.blocks import Step, Update
 
+ANY_FLOAT = ("Real", "Float64")
+"""Types that hold any finite number."""
 MAX_PARTS = 10_000
 """Most early returns without an event within one step."""
 
@@ -121,6 +123,21 @@ class FmuSlave(Slave):
             self._variable(name)
         return self._running.reader(names)
 
+    def writer(self, name: str) -> Callable[[Any], None]:
+        """See `Block.writer`."""
+        variable, full_name, put = self._variable(name), f"{self.name}.{name}", self._running.writer(name)
+        any_float = variable.type in ANY_FLOAT
+
+        def write(value: Any) -> None:
+            if not (any_float and type(value) is float and math.isfinite(value)):
+                try:
+                    value = exact(variable, value, full_name)
+                except UnfitError as error:
+                    raise MisfitError(str(error)) from error
+            put(value)
+
+        return write
+
     def load(self) -> FmuInstance:
         """Load the FMU's binary, once for all runs; `start` does it if nobody has."""
         return self._file.load(self.calls.hear)
@@ -139,10 +156,11 @@ class FmuSlave(Slave):
             other = ". The fixed-step master (--master fixed-step) leaves its event mode off." if events else ""
             raise CosimError(f"{self.name} refuses to be instantiated: {self.calls.said.rstrip('.')}{other}") from error
         self._access = FmuAccess(instance, self._variables, self.calls)
-        self._enter_event, self._enter_step = map(instance.caller, ("EnterEventMode", "EnterStepMode"))
-        self._iterate = instance.updater()
+        bound, modes = self.calls.bound, ("EnterEventMode", "EnterStepMode")
+        self._enter_event, self._enter_step = (bound(instance.caller(mode)) for mode in modes)
+        self._iterate = bound(instance.updater())
         if self.clocks:
-            self._active = instance.ticker(list(self._clock_references.values()))
+            self._active = bound(instance.ticker(list(self._clock_references.values())))
         self._access.start(
             {STOP_AT_EVENTS: True, **self._starts} if early and self.stops_after_events else self._starts
         )
@@ -155,22 +173,22 @@ class FmuSlave(Slave):
 
     def enter_event_mode(self) -> None:
         """See `Slave.enter_event_mode`."""
-        self.calls(self._enter_event)
+        self._enter_event()
 
     def enter_step_mode(self) -> None:
         """See `Slave.enter_step_mode`."""
-        self.calls(self._enter_step)
+        self._enter_step()
 
     def update(self) -> Update:
         """See `Slave.update`."""
-        ticks = self._ticks()
-        again, terminate, time = self.calls(self._iterate)
+        ticks = self._ticks() if self.clocks else ()
+        again, terminate, time = self._iterate()
         return Update(again, ticks, time, self.calls.termination() if terminate else None)
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Block.step`."""
         size = t_next - t if self.variable_step else self._size(t_next - t)
-        told = self.calls(self._do_step, t, size)
+        told = self._do_step(t, size)
         return Step(t_next, False) if told is None else self._carry_on(t, t_next, told)
 
     @property
@@ -199,7 +217,7 @@ class FmuSlave(Slave):
                     f"{self.name} returns from a step at {t:.17g} s and gets no further: {self.calls.said}"
                 )
             t = reached
-            told = self.calls(self._do_step, t, t_next - t if self.variable_step else self._size(t_next - t))
+            told = self._do_step(t, t_next - t if self.variable_step else self._size(t_next - t))
         raise CosimError(f"{self.name} returned early from one step {MAX_PARTS} times, the last time at {t:.17g} s.")
 
     def save(self) -> Any:
@@ -236,8 +254,9 @@ class FmuSlave(Slave):
         return self._running.instance
 
     def _first_step(self, t: float, size: float) -> Advance | None:
-        self._do_step = self._instance.stepper()
-        return self._do_step(t, size)
+        self._do_step = self.calls.bound(self._instance.stepper())
+        told: Advance | None = self._do_step(t, size)
+        return told
 
     def _variable(self, name: str) -> Any:
         try:
@@ -246,9 +265,7 @@ class FmuSlave(Slave):
             raise self.unknown(name) from None
 
     def _ticks(self) -> tuple[str, ...]:
-        if not self.clocks:
-            return ()
-        active = self.calls(self._active)
+        active = self._active()
         if True not in active:
             return ()
         return tuple(clock for clock, ticked in zip(self.clocks, active, strict=True) if ticked)

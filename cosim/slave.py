@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -141,10 +141,6 @@ class Slave(Block):
     @abstractmethod
     def get(self, name: str) -> Any:
         """Return the present value of a scalar variable: a `Value`."""
-
-    def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
-        """Return what gives the present values of scalars, for one who reads the same ones often in one run."""
-        return lambda: [self.get(name) for name in names]
 
     def parse(self, name: str, text: str) -> Value:
         """Return the value of a variable that a text says, for `set`.

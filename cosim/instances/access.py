@@ -62,6 +62,7 @@ class FmuAccess:
         self._variables, self._calls = variables, calls
         self._getters: dict[str, Callable[[], Any]] = {}
         self._setters: dict[str, Callable[[Sequence[Any]], None]] = {}
+        self._writers: dict[str, Callable[[Any], None]] = {}
         self._arrays: dict[str, list[Any]] = {}
 
     def start(self, values: Mapping[str, Any]) -> None:
@@ -135,17 +136,29 @@ class FmuAccess:
 
     def write(self, name: str, value: Any) -> None:
         """Write a scalar; of an array the others stay as they are."""
+        if name not in self._writers:
+            self._writers[name] = self.writer(name)
+        self._writers[name](value)
+
+    def writer(self, name: str) -> Callable[[Any], None]:
+        """Return what writes a scalar, for one who writes it often."""
         variable, index = self._variables.places[name]
         if variable.name not in self._setters:
-            self._setters[variable.name] = self.instance.writer(variable, self._variables.size(variable))
-        values = [value]
-        if variable.dimensions:
-            values = self._whole(variable)
-            values[index] = value
-        try:
-            self._calls(self._setters[variable.name], values)
-        except CosimError as error:
-            raise CosimError(f"{error} It was to set {name!r} to {value!r}.") from error
+            setter = self.instance.writer(variable, self._variables.size(variable))
+            self._setters[variable.name] = self._calls.bound(setter)
+        put, is_array = self._setters[variable.name], bool(variable.dimensions)
+
+        def write(value: Any) -> None:
+            values = [value]
+            if is_array:
+                values = self._whole(variable)
+                values[index] = value
+            try:
+                put(values)
+            except CosimError as error:
+                raise CosimError(f"{error} It was to set {name!r} to {value!r}.") from error
+
+        return write
 
     def held(self) -> dict[str, list[Any]]:
         """Return what is known of arrays, to be `recalled` with the FMU's state of now."""

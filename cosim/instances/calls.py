@@ -50,19 +50,34 @@ class FmuCalls:
         CosimError
             If the FMU answers with an error, with the last message of this call, or does not have the function.
         """
-        if self.messages:
-            self.messages.clear()
-        return self.answer(function, *arguments)
+        return self.bound(function)(*arguments)
+
+    def bound(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """Return what calls a function as `__call__` does, for one who calls it often."""
+        messages = self.messages
+
+        def call(*arguments: Any) -> Any:
+            if messages:
+                messages.clear()
+            try:
+                return function(*arguments)
+            except (FMICallException, VersionError) as error:
+                raise self._failure(error) from error
+
+        return call
 
     def answer(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Do the same with what reads the answer to a call that was made: the messages are those of that call."""
         try:
             return function(*arguments)
-        except FMICallException as error:
-            self.fatal = self.fatal or error.status == fmi3Fatal
-            raise CosimError(f"{self._name}: {error.function} failed: {self.said}") from error
-        except VersionError as error:
-            raise CosimError(str(error)) from error
+        except (FMICallException, VersionError) as error:
+            raise self._failure(error) from error
+
+    def _failure(self, error: FMICallException | VersionError) -> CosimError:
+        if isinstance(error, VersionError):
+            return CosimError(str(error))
+        self.fatal = self.fatal or error.status == fmi3Fatal
+        return CosimError(f"{self._name}: {error.function} failed: {self.said}")
 
     @property
     def said(self) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Curve, Given
 from cosim.masters.queues import queue_of
-from cosim.masters.start import outputs, require_times, sample_change, sample_end, start_slaves
+from cosim.masters.start import apart_from_the_rest, outputs, require_times, sample_change, sample_end, start_slaves
 from cosim.masters.treatments import exactly
 from cosim.result import CosimResult, Watch
 from cosim.system import System
@@ -24,6 +24,7 @@ ROUNDING = 1e-12
 """Relative rounding of the number of output intervals."""
 
 
+@apart_from_the_rest()
 def run_event_exact(
     system: System,
     t_stop: float,

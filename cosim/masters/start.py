@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+import gc
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from cosim.errors import CosimError
 from cosim.masters.changes import Changes
@@ -99,3 +101,20 @@ def sample_change(system: System, result: CosimResult, t: float, names: Sequence
 def outputs(system: System) -> dict[str, float]:
     """Return all outputs by ``slave.output``."""
     return {name: system.get(name) for name in system.output_names}
+
+
+@contextlib.contextmanager
+def apart_from_the_rest() -> Iterator[None]:
+    """Spare what is there already from the collections of garbage that a run brings about.
+
+    A full collection looks through all that the process holds, the descriptions of all FMUs among it, so an event
+    would cost the more the larger its system. What the run makes itself is collected as always.
+    """
+    if gc.get_freeze_count():  # of somebody else, who is to thaw it
+        yield
+        return
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()

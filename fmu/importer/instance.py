@@ -242,14 +242,13 @@ class FmuInstance:
                 return self._discarded(t, status) if status else None
 
             return step_of_fmi2
-        event, terminate, early, reached = c.c_bool(), c.c_bool(), c.c_bool(), c.c_double()
-        answers = c.byref(event), c.byref(terminate), c.byref(early), c.byref(reached)
-        call = self._bound("fmi3DoStep", time, length, c.c_bool(True), *answers)
+        flags, reached = (c.c_bool * 3)(), c.c_double()
+        call = self._bound("fmi3DoStep", time, length, c.c_bool(True), *_places(flags), c.byref(reached))
 
         def step(t: float, size: float) -> Advance | None:
             time.value, length.value = t, size
-            if (status := call()) > fmi1Warning or event.value or terminate.value or early.value:
-                return self.answered(t, status, Advance(reached.value, event.value, terminate.value, early.value))
+            if (status := call()) > fmi1Warning or True in flags:
+                return self.answered(t, status, Advance(reached.value, *flags))
             return None
 
         return step
@@ -289,14 +288,14 @@ class FmuInstance:
         """
         if self.major == 2:
             return self._update_of_fmi2
-        flags, time = [c.c_bool() for _ in range(5)], c.c_double()
-        again, terminate, _, _, defined = flags
-        call = self._bound("fmi3UpdateDiscreteStates", *map(c.byref, flags), c.byref(time))
+        flags, time = (c.c_bool * 5)(), c.c_double()
+        call = self._bound("fmi3UpdateDiscreteStates", *_places(flags), c.byref(time))
 
         def update() -> tuple[bool, bool, float | None]:
             if (status := call()) > fmi1Warning:
                 raise FMICallException(function="fmi3UpdateDiscreteStates", status=status)
-            return again.value, terminate.value, time.value if defined.value else None
+            again, terminate, _, _, defined = flags
+            return again, terminate, time.value if defined else None
 
         return update
 
@@ -339,6 +338,10 @@ class FmuInstance:
         getattr(self.fmu, spelled(self.major, "FreeInstance"))(self.fmu.component)
         if self._callbacks is not None:
             self._callbacks.release()
+
+
+def _places(flags: c.Array[c.c_bool]) -> list[Any]:
+    return [c.byref(flags, k) for k in range(len(flags))]
 
 
 def _converted(function: Callable[..., list[Any]], convert: Callable[[Any], Any]) -> Callable[..., list[Any]]:

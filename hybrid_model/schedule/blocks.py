@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -96,6 +98,14 @@ class Block(ABC):
     @abstractmethod
     def get(self, name: str) -> float:
         """Return the present value of a scalar variable."""
+
+    def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
+        """Return what gives the present values of scalars, for one who reads the same ones often in one run."""
+        return lambda: [self.get(name) for name in names]
+
+    def writer(self, name: str) -> Callable[[Any], None]:
+        """Return what sets a scalar input, for one who sets it often in one run."""
+        return functools.partial(self.set, name)
 
     @abstractmethod
     def enter_event_mode(self) -> None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -59,7 +59,19 @@ class Event(NamedTuple):
     block: str
 
 
-@dataclass
+class _Link:
+    """A wire under way: what comes over it, and the input that it leads to."""
+
+    __slots__ = ("carried", "holds", "input", "target", "write")
+
+    def __init__(self, wire: Wire, target: _Place) -> None:
+        self.carried, self.input, self.target = wire.carried, wire.input, target
+        self.write = target.block.writer(wire.input)
+        # An input is read once: what it holds later is what was sent to it.
+        self.holds = target.block.get(wire.input)
+
+
+@dataclass(slots=True, eq=False)
 class _Place:
     """A block and where it is."""
 
@@ -70,6 +82,17 @@ class _Place:
     next_event: float | None = None
     version: int = 0
     stalls: int = 0
+    read: Callable[[], list[Any]] | None = None
+    links: Sequence[tuple[int, _Link]] = ()
+
+    def connect(self, wires: Iterable[Wire], places: Mapping[str, _Place]) -> Callable[[], list[Any]]:
+        """Make ready what is sent, and return what reads it: no more of the block is read in a run than that."""
+        outputs: dict[str, int] = {}
+        self.links = [
+            (outputs.setdefault(wire.output, len(outputs)), _Link(wire, places[wire.target])) for wire in wires
+        ]
+        self.read = self.block.reader(list(outputs)) if outputs else list
+        return self.read
 
 
 class Scheduler:
@@ -121,10 +144,11 @@ class Scheduler:
         self._tolerance = tolerance
         self._watch = watch
         self._places = {name: _Place(block, k, t_start, t_start) for k, (name, block) in enumerate(blocks.items())}
-        self._unpredictable: set[str] = set()
-        self._idle: set[str] = set()
-        self._arrived: dict[tuple[str, str], Any] = {}
-        self._queue: list[tuple[float, int, int, str]] = []
+        self._in_order = list(self._places.values())
+        # Blocks go by their order from here on: numbers sort themselves.
+        self._unpredictable: set[int] = set()
+        self._idle: set[int] = set()
+        self._queue: list[tuple[float, int, int]] = []
 
     @property
     def next_event(self) -> float:
@@ -145,11 +169,11 @@ class Scheduler:
             if not due:
                 break
             self._happen(t, due)
-        for name, place in self._places.items():
+        for place in self._in_order:
             while not self.ended and place.t < limit:
                 if self._step(place, limit).event and not self.ended:
                     self._require_announced(place, limit)
-                    self._happen(limit, {name})
+                    self._happen(limit, {place.order})
         if not self.ended:
             self.t = limit
 
@@ -163,80 +187,73 @@ class Scheduler:
         due : collection of str
             Blocks that are there, in event mode.
         """
+        self._iterate(t, {self._places[name].order for name in due})
+
+    def _iterate(self, t: float, due: set[int]) -> None:
         pending, touched = set(due), set(due)
-        iterations: dict[str, int] = {}
+        iterations: dict[int, int] = {}
         self.t = t
         while pending and not self.ended:
-            name = self._in_order(pending)[0]
-            iterations[name] = iterations.get(name, 0) + 1
-            if iterations[name] > ITERATIONS:
-                raise SchedulingError(f"{name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s.")
-            update = self._places[name].block.update()
-            self.ticks += [Tick(t, name, clock) for clock in update.ticks]
-            if update.idle and iterations[name] == 1:
-                self._idle.add(name)
-            if update.terminated:
-                self.ended = name, t, update.terminated
+            order = min(pending)
+            place = self._in_order[order]
+            iterations[order] = iterations.get(order, 0) + 1
+            if iterations[order] > ITERATIONS:
+                raise SchedulingError(
+                    f"{place.block.name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s."
+                )
+            again, ticks, place.next_event, terminated, idle = place.block.update()
+            if ticks:
+                self.ticks += [Tick(t, place.block.name, clock) for clock in ticks]
+            if idle and iterations[order] == 1:
+                self._idle.add(order)
+            if terminated:
+                self.ended = place.block.name, t, terminated
                 return
-            self._places[name].next_event = update.next_event
-            if not update.again:
-                pending.discard(name)
-            receivers = self._send(name, t, touched)
-            pending |= receivers
-            touched |= receivers
-        for name in touched:
-            self._leave_event_mode(name)
+            if not again:
+                pending.discard(order)
+            self._send(place, t, pending, touched)
+        for order in touched:
+            self._leave_event_mode(self._in_order[order])
 
-    def _happen(self, t: float, due: set[str]) -> None:
+    def _happen(self, t: float, due: set[int]) -> None:
         """Handle the events of blocks that are at their instant."""
         if self._watch:
             due = self._bring_all(t, due)
             self._watch(t)
         if self.ended:
             return
-        for name in self._in_order(due):
-            self._places[name].block.enter_event_mode()
+        happened = [self._in_order[order] for order in sorted(due)]
+        for place in happened:
+            place.block.enter_event_mode()
         self._idle.clear()
-        self.handle_events(t, due)
+        self._iterate(t, due)
         # Predictions end at the stop time, where there may be no event.
-        self.events += [Event(t, name) for name in self._in_order(due) if name not in self._idle]
+        self.events += [Event(t, place.block.name) for place in happened if place.order not in self._idle]
         if self._watch:
             self._watch(t)
 
-    def _bring_all(self, t: float, due: set[str]) -> set[str]:
+    def _bring_all(self, t: float, due: set[int]) -> set[int]:
         """Bring all blocks to an instant; return those that have events there."""
-        behind = [place for name, place in self._places.items() if place.t < t and name not in due]
+        behind = [place for place in self._in_order if place.t < t and place.order not in due]
         stopped = [place for place in behind if not self.ended and self._step(place, t).event]
         for place in stopped:
             self._require_announced(place, t)
-        return due | {place.block.name for place in stopped}
+        return due | {place.order for place in stopped}
 
-    def _in_order(self, names: Iterable[str]) -> list[str]:
-        some = list(names)
-        return sorted(some, key=lambda name: self._places[name].order) if len(some) > 1 else some
-
-    def _send(self, name: str, t: float, touched: set[str]) -> set[str]:
-        """Carry the outputs of a block to their receivers; return those for whom something changed."""
-        receivers: set[str] = set()
-        sender = self._places[name].block
-        read: dict[str, Any] = {}
-        for wire in self._wires_from(name):
-            if wire.output not in read:
-                read[wire.output] = sender.get(wire.output)
-            value = wire.carried(read[wire.output])
-            place, at = self._places[wire.target], (wire.target, wire.input)
-            # An input is read once: what it holds later is what was sent to it.
-            if at not in self._arrived:
-                self._arrived[at] = place.block.get(wire.input)
-            if self._arrived[at] == value:
+    def _send(self, place: _Place, t: float, pending: set[int], touched: set[int]) -> None:
+        """Carry the outputs of a block to their receivers; those for whom something changed are pending."""
+        values = (place.read or place.connect(self._wires_from(place.block.name), self._places))()
+        for index, link in place.links:
+            value, target = link.carried(values[index]), link.target
+            if link.holds == value:
                 continue
-            self._arrived[at] = value
-            if wire.target not in touched and wire.target not in receivers:
-                self._require_behind(place, t, name)
-                self._bring(place, t)
-            place.block.set(wire.input, value)
-            receivers.add(wire.target)
-        return receivers
+            link.holds = value
+            if target.order not in touched:
+                self._require_behind(target, t, place.block.name)
+                self._bring(target, t)
+                touched.add(target.order)
+            link.write(value)
+            pending.add(target.order)
 
     def _bring(self, place: _Place, t: float) -> None:
         """Bring a block that receives something to this instant, into event mode."""
@@ -262,59 +279,58 @@ class Scheduler:
 
     def _step(self, place: _Place, t: float) -> Step:
         made = place.block.step(place.t, t)
+        reached, _, terminated = made
         self.steps += 1
-        if made.reached < place.t or (made.reached > t and made.reached > t + self._instant(place, t)):
+        if reached < place.t or (reached > t and reached > t + self._instant(place, t)):
             raise SchedulingError(
                 f"{place.block.name} stepped from {place.t:.12g} towards {t:.12g} s and says that it is at "
-                f"{made.reached:.12g} s: that is outside the step."
+                f"{reached:.12g} s: that is outside the step."
             )
-        self._require_progress(place, made)
-        place.t = made.reached
-        if made.terminated:
-            self.ended = place.block.name, made.reached, made.terminated
-        return made
-
-    def _require_progress(self, place: _Place, made: Step) -> None:
-        """Refuse blocks that have one event after the other where they are."""
-        place.stalls = 0 if made.reached > place.t or made.terminated else place.stalls + 1
+        # Blocks may have one event after the other where they are, but not without end.
+        place.stalls = 0 if reached > place.t or terminated else place.stalls + 1
         if place.stalls > ITERATIONS:
             raise SchedulingError(
                 f"{place.block.name} gets no further than t = {place.t:.12g} s: each of its last {ITERATIONS} steps "
                 "ended there with an event."
             )
+        place.t = reached
+        if terminated:
+            self.ended = place.block.name, reached, terminated
+        return made
 
-    def _leave_event_mode(self, name: str) -> None:
-        place = self._places[name]
+    def _leave_event_mode(self, place: _Place) -> None:
         place.block.enter_step_mode()
         place.version += 1
         place.t_event = place.t
-        predicts = place.next_event is not None and place.block.foresees
-        (self._unpredictable.discard if predicts else self._unpredictable.add)(name)
-        if place.next_event is None:
+        foreseen = place.next_event
+        predicts = foreseen is not None and place.block.foresees
+        (self._unpredictable.discard if predicts else self._unpredictable.add)(place.order)
+        if foreseen is None:
             return
-        if place.next_event <= place.t:
+        if foreseen <= place.t:
             raise SchedulingError(
-                f"{name} is at t = {place.t:.12g} s and says that its next event is at {place.next_event:.12g} s: that "
-                "is not ahead."
+                f"{place.block.name} is at t = {place.t:.12g} s and says that its next event is at {foreseen:.12g} s: "
+                "that is not ahead."
             )
-        heapq.heappush(self._queue, (place.next_event, place.order, place.version, name))
+        heapq.heappush(self._queue, (foreseen, place.order, place.version))
 
-    def _next_instant(self, limit: float) -> tuple[float, set[str]]:
+    def _next_instant(self, limit: float) -> tuple[float, set[int]]:
         """Find the next instant with events up to `limit`, and bring the blocks concerned there."""
+        queue = self._queue
         self._drop_obsolete()
-        first = min(self._queue[0][0] if self._queue else math.inf, limit)
-        stopped = self._watch_unpredictable(first)
+        first = min(queue[0][0] if queue else math.inf, limit)
+        stopped = self._watch_unpredictable(first) if self._unpredictable else []
         if stopped:
             first = min(place.t for place in stopped)
-        due = {place.block.name for place in stopped}
+        due = {place.order for place in stopped}
         instant = first
-        while self._queue and self._queue[0][0] <= limit and self._is_at(first):
-            time, _, _, name = heapq.heappop(self._queue)
+        while queue and queue[0][0] <= limit and self._is_at(first):
+            time, order, _ = heapq.heappop(queue)
             instant = max(instant, time)
-            due.add(name)
+            due.add(order)
             self._drop_obsolete()
-        for name in self._in_order(due):
-            place = self._places[name]
+        for order in sorted(due):
+            place = self._in_order[order]
             # What has stopped for an event is there; FMI allows no step before it is handled.
             if place.t < instant and place not in stopped and not self.ended:
                 self._step(place, instant)
@@ -322,8 +338,8 @@ class Scheduler:
 
     def _is_at(self, t: float) -> bool:
         """Return whether the first prediction is of the instant `t` in s."""
-        time, _, _, name = self._queue[0]
-        return time <= t or time <= t + self._instant(self._places[name], t)
+        time, order, _ = self._queue[0]
+        return time <= t or time <= t + self._instant(self._in_order[order], t)
 
     def _instant(self, place: _Place, t: float) -> float:
         """Return in s how far a block's event may be from `t` and still be of that instant (rule 6)."""
@@ -332,7 +348,7 @@ class Scheduler:
         return one_instant(t, self._t_start, place.t_event)
 
     def _drop_obsolete(self) -> None:
-        while self._queue and self._places[self._queue[0][3]].version != self._queue[0][2]:
+        while self._queue and self._in_order[self._queue[0][1]].version != self._queue[0][2]:
             heapq.heappop(self._queue)
 
     def _watch_unpredictable(self, horizon: float) -> list[_Place]:
@@ -341,9 +357,7 @@ class Scheduler:
         Each is stepped to the first stop of those before it. Those that are beyond the last one's return there; what
         cannot return stays ahead, for as long as nobody sends anything to it.
         """
-        if not self._unpredictable:
-            return []
-        watched = [self._places[name] for name in self._unpredictable if self._places[name].t < horizon]
+        watched = [place for place in map(self._in_order.__getitem__, self._unpredictable) if place.t < horizon]
         watched.sort(key=lambda place: (not place.block.can_restore, place.order))
         # Nobody can be behind the one that is stepped last.
         saved = [(place, place.t, place.block.save()) for place in watched[:-1] if place.block.can_restore]
@@ -368,5 +382,5 @@ class Scheduler:
                 place.block.release(state)
         for place in stopped:
             if place.t > first + self._instant(place, first) and not place.block.can_restore:
-                heapq.heappush(self._queue, (place.t, place.order, place.version, place.block.name))
+                heapq.heappush(self._queue, (place.t, place.order, place.version))
         return [place for place in stopped if place.t <= first + self._instant(place, first)]

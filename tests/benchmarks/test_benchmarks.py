@@ -2,10 +2,11 @@
 
 from dataclasses import replace
 
+import fmpy
 import numpy as np
 import pytest
 
-from benchmarks import step_cost
+from benchmarks import event_cost, step_cost
 from benchmarks.contenders import CONTENDERS
 from benchmarks.measure import Entry, choose, fastest_scipy, score
 from benchmarks.problems import MIRRORED, PAPER_DYNAMIC, PROBLEMS, Ball, Outcome
@@ -115,6 +116,23 @@ def test_the_c_driver_runs_fmus_past_an_impact_and_times_every_call(tmp_path, ex
     # Forward Euler finds the floor at the end of a step of 1 ms, the second one after the impact.
     late, _ = step_cost.impact_errors(measured[euler.name].values)
     assert late == pytest.approx(0.453 - impact, abs=1e-9)
+
+
+def test_the_loops_of_an_event_make_the_run_of_the_master(tmp_path):
+    timer, tank = event_cost.exported(tmp_path)
+    assert event_cost.calls_of_an_event(timer, tank) == 10
+    loop, levels = event_cost.Loop(timer, tank), []
+    result = event_cost.master_run(timer, tank, 3)[1]
+    at = [v.valueReference for v in fmpy.read_model_description(str(tank)).modelVariables if v.name == "level"]
+    for calls in (loop.by_fmpy, loop.bare):
+
+        def watched(events, calls=calls):
+            calls(events)
+            loop.tank.doStep(3.0, 0.5)
+            levels.append(loop.tank.getFloat64(at)[0])
+
+        loop.run(watched, 3)
+    assert levels == [result.final["tank.level"]] * 2
 
 
 def test_the_c_driver_says_what_a_contender_refuses(tmp_path, exported):
