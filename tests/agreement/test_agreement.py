@@ -1,8 +1,8 @@
 """The heart of the project: one automaton in all its executions, and all of them agree.
 
-The Python run integrates with DOP853 over SciPy, the FMU of Co-Simulation with its own Dormand-Prince code in C, the
-co-simulation predicts event by event; the FMU of Model Exchange leaves integration and location of events to an
-importer. What they share is the automaton and nothing of the numerics.
+The Python run integrates with DOP853 over SciPy, the native run and the FMU of Co-Simulation with their own
+Dormand-Prince code in C, the co-simulation predicts event by event; the FMU of Model Exchange leaves integration and
+location of events to an importer. What they share is the automaton and nothing of the numerics.
 """
 
 import importlib
@@ -12,7 +12,7 @@ import pkgutil
 import numpy as np
 import pytest
 from catalogue import cases
-from executions import reference, shown, starts, values_of
+from executions import reference, shown, starts, step_inputs, values_of
 from own_importer import exchange, step_through
 
 import hybrid_model as hm
@@ -22,6 +22,7 @@ from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact
 from cosim.system import System
 from hybrid_model import consensus
+from hybrid_model.declare.variables import Kind
 
 # The issue's limits: times of events, and states.
 TIME_TOLERANCE = 1e-7
@@ -45,6 +46,10 @@ QUICK = {
 def fmi2_cases():
     """The catalogue, most of it for the long run."""
     return [name if name in QUICK else pytest.param(name, marks=pytest.mark.long) for name in cases()]
+
+
+# Case by case, so that all tests of one share its run in Python, and those after the first its traced maps.
+each_case = pytest.mark.parametrize("name", list(cases()), scope="module")
 
 
 class StepSource(hm.HybridAutomaton):
@@ -88,17 +93,36 @@ def compare(case, arc, result):
         np.testing.assert_allclose(result.signals[f"block.{name}"], values, rtol=0, atol=STATE_TOLERANCE, err_msg=name)
 
 
-@pytest.mark.parametrize("name", list(cases()))
+@each_case
+def test_fmu_cosimulation_agrees_with_python_run(name, exported):
+    case = cases()[name]
+    slave = FmuSlave("block", exported(case.automaton, name))
+    compare(case, reference(name), cosimulate(case, slave))
+
+
+@each_case
 def test_in_process_cosimulation_agrees_with_python_run(name):
     case = cases()[name]
     compare(case, reference(name), cosimulate(case, AutomatonSlave("block", case.automaton)))
 
 
-@pytest.mark.parametrize("name", list(cases()))
-def test_fmu_cosimulation_agrees_with_python_run(name, exported):
+@each_case
+def test_native_run_agrees_with_python_run(name):
     case = cases()[name]
-    slave = FmuSlave("block", exported(case.automaton, name))
-    compare(case, reference(name), cosimulate(case, slave))
+    plain = reference(name)
+    fast = hm.simulate(case.automaton, case.t_end, inputs=step_inputs(case), engine="native")
+    assert [(jump.name, jump.j) for jump in fast.jumps] == [(jump.name, jump.j) for jump in plain.jumps]
+    # Two solvers at a relative tolerance of 1e-13, and rounding, magnified by what lies between two jumps.
+    close = 5e-9 if name == "stiff_thermostat" else 1e-9  # 20 degC, where the slowest margin moves by 1e-3 K/s
+    np.testing.assert_allclose([jump.t for jump in fast.jumps], [jump.t for jump in plain.jumps], rtol=0, atol=close)
+    assert fast.stop is plain.stop
+    assert fast.event_tolerance == pytest.approx(plain.event_tolerance)
+    times = np.linspace(0.0, min(fast.t[-1], plain.t[-1]), 101)
+    between = times[[not np.isclose(t, [jump.t for jump in plain.jumps], rtol=0, atol=2e-9).any() for t in times]]
+    for variable in case.automaton.of_kind(Kind.STATE, Kind.DISCRETE, Kind.OUTPUT):
+        # Of values above one, of them: the thermostat's 20 degC, van der Pol's v, which changes by 50 in a second.
+        expected = plain.at(variable.name, between)
+        np.testing.assert_allclose(fast.at(variable.name, between), expected, rtol=1e-10, atol=1e-10)
 
 
 # What importers of FMI 2.0 and of Model Exchange do: there are no clocks, so the log tells the jumps.
@@ -122,12 +146,12 @@ def compare_run(case, arc, run, *, without=()):
         np.testing.assert_allclose(np.array(found)[kept], values, rtol=0, atol=STATE_TOLERANCE, err_msg=name)
 
 
-@pytest.mark.parametrize("name", list(cases()))
+@each_case
 def test_model_exchange_agrees_with_python_run(name, exported):
     model_exchange(name, "3.0", exported)
 
 
-@pytest.mark.parametrize("name", fmi2_cases())
+@pytest.mark.parametrize("name", fmi2_cases(), scope="module")
 def test_fmi2_model_exchange_agrees_with_python_run(name, exported):
     model_exchange(name, "2.0", exported)
 
@@ -139,7 +163,7 @@ def model_exchange(name, fmi, exported):
     compare_run(case, reference(name), run)
 
 
-@pytest.mark.parametrize("name", fmi2_cases())
+@pytest.mark.parametrize("name", fmi2_cases(), scope="module")
 def test_fmi2_cosimulation_agrees_with_python_run(name, exported):
     """Inputs change at communication points, and what they bring about is seen after the next step."""
     case = cases()[name]

@@ -1,4 +1,4 @@
-"""Runs on the native engine: the same as in the Python engine; what runs where, and what is kept of a run."""
+"""Runs on the native engine: what runs where, and what is kept of a run."""
 
 import functools
 import pickle
@@ -6,31 +6,10 @@ import pickle
 import numpy as np
 import pytest
 from catalogue import cases
-from executions import reference, step_inputs
 
 import hybrid_model as hm
-from hybrid_model.declare.variables import Kind
 from hybrid_model.errors import SimulationError
 from hybrid_model.native.run import NativeRun
-
-
-@pytest.mark.parametrize("name", list(cases()))
-def test_every_model_runs_alike(name):
-    case = cases()[name]
-    plain = reference(name)
-    fast = hm.simulate(case.automaton, case.t_end, inputs=step_inputs(case), engine="native")
-    assert [(jump.name, jump.j) for jump in fast.jumps] == [(jump.name, jump.j) for jump in plain.jumps]
-    # Two solvers at a relative tolerance of 1e-13, and rounding, magnified by what lies between two jumps.
-    close = 5e-9 if name == "stiff_thermostat" else 1e-9  # 20 degC, where the slowest margin moves by 1e-3 K/s
-    np.testing.assert_allclose([jump.t for jump in fast.jumps], [jump.t for jump in plain.jumps], rtol=0, atol=close)
-    assert fast.stop is plain.stop
-    assert fast.event_tolerance == pytest.approx(plain.event_tolerance)
-    times = np.linspace(0.0, min(fast.t[-1], plain.t[-1]), 101)
-    between = times[[not np.isclose(t, [jump.t for jump in plain.jumps], rtol=0, atol=2e-9).any() for t in times]]
-    for variable in case.automaton.of_kind(Kind.STATE, Kind.DISCRETE, Kind.OUTPUT):
-        # Of values above one, of them: the thermostat's 20 degC, van der Pol's v, which changes by 50 in a second.
-        expected = plain.at(variable.name, between)
-        np.testing.assert_allclose(fast.at(variable.name, between), expected, rtol=1e-10, atol=1e-10)
 
 
 def test_inputs_that_vary_and_a_copy_of_the_run():
