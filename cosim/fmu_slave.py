@@ -75,7 +75,7 @@ class FmuSlave(Slave):
         self._do_step: Callable[[float, float], Advance | None] = self._first_step
         self._begun = False
         self._starts: dict[str, Any] = {}
-        self._events = self._early = False
+        self._events = self._early = self._idle = False
         self._step_size = math.nan
 
     @property
@@ -183,12 +183,14 @@ class FmuSlave(Slave):
         """See `Slave.update`."""
         ticks = self._ticks() if self.clocks else ()
         again, terminate, time = self._iterate()
-        return Update(again, ticks, time, self.calls.termination() if terminate else None)
+        return Update(again, ticks, time, self.calls.termination() if terminate else None, self._idle)
 
     def step(self, t: float, t_next: float) -> Step:
         """See `Block.step`."""
         size = t_next - t if self.variable_step else self._size(t_next - t)
         told = self._do_step(t, size)
+        # Ours say at the end of a step that they have an event there; what they announce may be as far as they look.
+        self._idle = self.foresees and (told is None or not told.event)
         return Step(t_next, False) if told is None else self._carry_on(t, t_next, told)
 
     @property

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
 import shutil
 import sys
+from collections.abc import Iterator
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +20,7 @@ from cosim.cli.progress import Work
 from cosim.cli.run_files import RunFiles
 from cosim.cli.step_study import study
 from cosim.consensus import fmu_system
-from cosim.errors import CosimError, UsageError
+from cosim.errors import CosimError, MisfitError, UsageError
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
 from cosim.masters.error_controlled import TOLERANCE
@@ -50,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
     starts = given_values(options.start_value)
     folder = temporary_folder()
     try:
-        definition = read_system(options.system)
+        definition = _described(options)
         if definition is not None and options.step_study is not None:
             raise UsageError(f"--step-study is for scenarios, and {options.system} is none.")
         if definition is None:
@@ -76,14 +78,32 @@ def run(options: argparse.Namespace) -> int:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+def _described(options: argparse.Namespace) -> SystemDefinition | None:
+    with _slips_of(options):
+        return read_system(options.system)
+
+
 def _assembled(definition: SystemDefinition, options: argparse.Namespace) -> System:
-    return assemble(
-        definition,
-        validate=not options.no_validate,
-        isolate=options.isolate,
-        patience=options.call_timeout,
-        loop_iterations=options.loop_iterations,
-    )
+    with _slips_of(options):
+        return assemble(
+            definition,
+            validate=not options.no_validate,
+            isolate=options.isolate,
+            patience=options.call_timeout,
+            loop_iterations=options.loop_iterations,
+        )
+
+
+@contextlib.contextmanager
+def _slips_of(options: argparse.Namespace) -> Iterator[None]:
+    """Let what a system's own file says and does not fit be wrong usage, as it is of scenarios."""
+    try:
+        yield
+    except MisfitError as error:
+        written = Path(options.system)
+        if written.is_dir() or written.suffix.lower() == ".toml":
+            raise UsageError(str(error)) from error
+        raise
 
 
 def _save(options: argparse.Namespace, definition: SystemDefinition, system: System, experiment: Experiment) -> int:

@@ -11,6 +11,8 @@ from fmu.archives.writing import replacing
 
 MOST_AXES = 8
 """Most axes in one picture; further signals share them."""
+BESIDE = 3
+"""Names of signals in one line above their axes."""
 
 
 def draw(
@@ -45,13 +47,13 @@ def draw(
     numbers = {name: values for name, values in signals.items() if values and not isinstance(values[0], (str, bytes))}
     count = max(min(len(numbers), MOST_AXES), 1)
     with plt.rc_context(JOURNAL):
-        figure, axes = plt.subplots(count, sharex=True, squeeze=False, figsize=(6.0, 1.2 + 1.1 * count))
+        figure, axes = plt.subplots(count, sharex=True, squeeze=False, figsize=(6.0, 1.2 + 1.3 * count))
+        shared: list[dict[str, Sequence[Any]]] = [{} for _ in range(count)]
         for k, (name, values) in enumerate(numbers.items()):
-            ax = axes[k * count // max(len(numbers), 1), 0]
-            ax.plot(times, [float(value) for value in values], label=name)
-        for ax in axes[:, 0]:
-            ax.legend(loc="upper right")
-        axes[0, 0].set_title(title)
+            shared[k * count // len(numbers)][name] = values
+        for ax, some in zip(axes[:, 0], shared, strict=True):
+            _curves(ax, times, some)
+        figure.suptitle(title)
         axes[-1, 0].set_xlabel(TIME)
         if path is not None:
             with replacing(path) as part, measured_by_tex() if form == "pgf" else nullcontext():
@@ -59,3 +61,20 @@ def draw(
         if show:
             plt.show()
         plt.close(figure)
+
+
+def _curves(ax: Any, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    whole = {name: isinstance(values[0], int) for name, values in signals.items()}
+    for name, values in signals.items():
+        # Whole numbers have no values between two, where there is one row of a jump neither.
+        drawn = "steps-post" if whole[name] else "default"
+        ax.plot(times, [float(value) for value in values], label=name, drawstyle=drawn)
+    if signals and all(whole.values()):
+        ax.yaxis.set_major_locator(MaxNLocator(nbins=5, integer=True, min_n_ticks=1))
+        if len(set().union(*signals.values())) == 1:
+            ax.margins(y=10.0)  # of a range that is next to nothing
+    if signals:
+        # Above the axes, where no curve is.
+        ax.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=BESIDE, borderaxespad=0.1)

@@ -87,6 +87,13 @@ def test_ball_under_the_fixed_step_master_is_the_python_run(fmi, exported):
         np.testing.assert_allclose(result.signals[f"ball.{name}"], arc.at(name, times), rtol=0, atol=1e-8)
 
 
+def test_the_end_of_what_an_fmu_foresees_is_no_event(exported):
+    """Impacts are at sqrt(2 h/g) and 2.4 times that: what ends in between ends with no event."""
+    ball, impact = FmuSlave("ball", exported(BouncingBall())), math.sqrt(2.0 / 9.81)
+    for stop, count in ((0.5 * impact, 0), (2.0 * impact, 1)):
+        assert len(run_event_exact(System([ball], {}), stop).events) == count
+
+
 def test_steps_that_fmi2_ends_at_events_are_carried_on(exported):
     """With the option set, fmi2DoStep answers fmi2Discard at each impact; the master sees whole steps."""
     slave = FmuSlave("ball", exported(BouncingBall(), "ball", "2.0"))

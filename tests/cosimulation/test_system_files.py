@@ -123,6 +123,14 @@ def test_what_does_not_fit_is_refused(old, new, sentence, folder):
         assemble(read_toml(path))
 
 
+@pytest.mark.parametrize(
+    ("old", "new"), [("period = 0.5", "perod = 0.5"), ('"b.count"]', '"b.cuont"]'), ("[inputs]", "[input]")]
+)
+def test_a_slip_in_the_file_is_wrong_usage(old, new, folder, capsys):
+    assert main(["cosim", str(changed(folder, old, new))]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
 def test_a_master_that_there_is_not_is_refused(folder, capsys):
     assert main(["cosim", str(changed(folder, "stop_time = 2.2", 'stop_time = 2.2\nmaster = "best"'))]) == 2
     assert "the master 'best' is none of event-exact, error-controlled, fixed-step" in capsys.readouterr().err
@@ -135,7 +143,7 @@ def test_a_folder_of_fmus_is_a_system_of_them(stranger, tmp_path, capsys):
     assert "one.count = 2" in said
     assert "two.count = 2" in said
     (tmp_path / "empty").mkdir()
-    assert main(["cosim", str(tmp_path / "empty")]) == 1
+    assert main(["cosim", str(tmp_path / "empty")]) == 2
     assert "has no system.toml and no FMU" in capsys.readouterr().err
 
 

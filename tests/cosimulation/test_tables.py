@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from cosim.cli.main import main
 from cosim.errors import CosimError, MisfitError
@@ -14,6 +15,7 @@ from cosim.result import CosimResult
 from cosim.system import System
 from cosim.tables.comparison import deviations
 from cosim.tables.input_table import Polyline, Staircase, read_inputs
+from cosim.tables.picture import draw
 from cosim.tables.row_file import Columns, RowFile
 
 
@@ -198,3 +200,20 @@ def test_a_trajectory_of_a_scenario_has_both_rows_of_a_jump(tmp_path):
         changed = np.flatnonzero(np.any(np.diff(sent) != 0.0, axis=0))
         assert set(changed) <= set(twice)
         assert math.isclose(times[-1], 2.0)
+
+
+def test_names_lie_on_no_curve_and_whole_numbers_have_whole_ticks(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    times, names = [0.0, 1.0, 1.0, 2.0], [f"modes{k}" for k in range(4)]
+    signals = {"mode": [0, 0, 2, 2], "is_on": [True] * 4, "level": [0.0, 1.0, 0.0, 0.5]}
+    signals |= {name: [0, 1, 1, 3] for name in names}
+    draw(times, signals, "run", tmp_path / "run.png", show=False)
+    figure = drawn[0]
+    figure.canvas.draw()
+    for ax, values in zip(figure.axes, signals.values(), strict=True):
+        assert not ax.get_legend().get_window_extent().overlaps(ax.get_window_extent())
+        low, high = ax.get_ylim()
+        ticks = [tick for tick in ax.get_yticks() if low <= tick <= high]
+        assert ticks
+        assert isinstance(values[0], float) or all(tick == round(tick) for tick in ticks)
