@@ -154,6 +154,8 @@ bool engine_predict(Engine *engine, double limit, double *event_time);
 /* The same for whoever comes back to times before that event: where the interpolation of a step is the step itself, the
    first step is kept for them. */
 bool engine_look_ahead(Engine *engine, double limit, double *event_time);
+/* Goes on where the last look ahead has ended for want of steps, as many further. */
+bool engine_look_further(Engine *engine, double limit, double *event_time);
 /* Whether the last prediction, still valid, is of an event. */
 bool engine_foresees(const Engine *engine);
 /* The earliest time event after now; breakpoints of the flow only if asked for. */

@@ -37,29 +37,35 @@ static double quiet_until(const Engine *engine, double known)
     return known - fmax(4.0 * engine_time_ulp(known), engine_one_instant(engine, known));
 }
 
+/* Goes on from the predicted point over so many steps; whether that is ahead, and its time. */
+static bool foresee(Engine *engine, double limit, size_t budget, double *event_time)
+{
+    double now = *engine->live.time, horizon = isfinite(limit) ? limit : look_ahead_limit(engine);
+    FlowEnd end = engine_flow(engine, &engine->predicted, fmin(limit, horizon), true, &budget);
+    engine->keeps = false;
+    bool renew = end == FLOW_BUDGET || (end == FLOW_REACHED && limit > horizon);
+    /* A problem ahead is reported when its time is reached; it may never be, if an input changes. */
+    engine->status->prediction = end == FLOW_EVENT ? PREDICTION_EVENT : renew ? PREDICTION_RENEWAL : PREDICTION_QUIET;
+    /* Without an event ahead the limit is announced, where nothing happens: that too is knowledge. */
+    *event_time = *engine->predicted.time;
+    return *event_time > now;
+}
+
 /* Looks ahead over so many steps; with `keep` the live point then moves along the first of them. */
 static bool look_ahead(Engine *engine, double limit, size_t budget, bool keep, double *event_time)
 {
     Status *status = engine->status;
-    double now = *engine->live.time;
     engine_leave_segment(engine);
     status->prediction = PREDICTION_NONE;
     if (status->ending != ENDED_NOT)
         return false;
-    double horizon = isfinite(limit) ? limit : look_ahead_limit(engine);
     /* Along a step there is no breakpoint, so those that are due come before it. */
     engine->keeps = keep && engine->method->is_exact && engine_take_internal_jumps(engine, &engine->live);
     engine_copy_point(engine, &engine->live, &engine->predicted);
-    FlowEnd end = engine_flow(engine, &engine->predicted, fmin(limit, horizon), true, &budget);
-    engine->keeps = false;
+    bool ahead = foresee(engine, limit, budget, event_time);
     if (status->has_segment)
         status->segment_quiet = fmin(status->segment_end, quiet_until(engine, *engine->predicted.time));
-    bool renew = end == FLOW_BUDGET || (end == FLOW_REACHED && limit > horizon);
-    /* A problem ahead is reported when its time is reached; it may never be, if an input changes. */
-    status->prediction = end == FLOW_EVENT ? PREDICTION_EVENT : renew ? PREDICTION_RENEWAL : PREDICTION_QUIET;
-    /* Without an event ahead the limit is announced, where nothing happens: that too is knowledge. */
-    *event_time = *engine->predicted.time;
-    return *event_time > now;
+    return ahead;
 }
 
 bool engine_predict(Engine *engine, double limit, double *event_time)
@@ -70,6 +76,13 @@ bool engine_predict(Engine *engine, double limit, double *event_time)
 bool engine_look_ahead(Engine *engine, double limit, double *event_time)
 {
     return look_ahead(engine, limit, look_ahead_steps(engine), true, event_time);
+}
+
+bool engine_look_further(Engine *engine, double limit, double *event_time)
+{
+    if (engine->status->prediction != PREDICTION_RENEWAL)
+        return engine_look_ahead(engine, limit, event_time);
+    return foresee(engine, limit, look_ahead_steps(engine), event_time);
 }
 
 bool engine_foresees(const Engine *engine)

@@ -43,7 +43,7 @@ bool assembled_predict(Assembled *assembled, double *event_time)
     if (!assembled_settle(assembled, &next))
         return false;
     while (queue->count > 0 && schedule->parts[queue->parts[0]].unsure && !schedule->parts[queue->parts[0]].far) {
-        schedule_predict_far(schedule, queue->parts[0], engine_options(assembled->whole)->look_ahead_steps);
+        schedule_predict_further(schedule, queue->parts[0], engine_options(assembled->whole)->look_ahead_steps);
         if (schedule->end != SCHEDULE_GOING)
             return assembled_over(assembled);
     }

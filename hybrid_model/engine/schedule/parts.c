@@ -134,38 +134,36 @@ bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event)
     return true;
 }
 
-/* Looks so many steps ahead; a step that is made again, shorter, counts as one, and may be all of them. */
-static bool look_ahead(Schedule *schedule, uint32_t i, double steps, double *next)
+/* Where a value comes from outside, a part is asked anew. */
+static double limit_of(Schedule *schedule, uint32_t i)
+{
+    return fmin(schedule->stop, schedule_at(schedule, i)->status->stop_time);
+}
+
+/* Looks some steps ahead, or on from where a look ahead has ended, beyond `known`; a step that is made again, shorter,
+   counts as one, and may be all of them. */
+static bool look(Schedule *schedule, uint32_t i, bool further, double known, double *next)
 {
     Engine *engine = schedule_at(schedule, i);
-    double few = engine->options.look_ahead_steps;
+    double few = engine->options.look_ahead_steps, steps = few, limit = limit_of(schedule, i);
     bool ahead;
+    *next = known;
     do {
         engine->options.look_ahead_steps = steps;
-        ahead = engine_look_ahead(engine, schedule->stop, next);
+        ahead = further ? engine_look_further(engine, limit, next) : engine_look_ahead(engine, limit, next);
         steps *= 8.0;
-    } while (!ahead && engine->status->prediction == PREDICTION_RENEWAL && steps < MOST_ITERATIONS);
+    } while (!(*next > known) && engine->status->prediction == PREDICTION_RENEWAL && steps < MOST_ITERATIONS);
     engine->options.look_ahead_steps = few;
     return ahead;
 }
 
-static void predict(Schedule *schedule, uint32_t i, double steps)
+/* What a look ahead has found goes into the queue. */
+static void note(Schedule *schedule, uint32_t i, bool ahead, double next)
 {
     Part *part = &schedule->parts[i];
-    double next;
-    const Engine *engine = schedule_at(schedule, i);
-    /* Where a value comes from outside, the part is asked anew. */
-    double limit = fmin(schedule->stop, engine->status->stop_time);
-    schedule->work++;
+    double limit = limit_of(schedule, i);
+    Prediction found = (Prediction)schedule_at(schedule, i)->status->prediction;
     part->unsure = part->far = false;
-    if (part->t >= limit) {
-        queue_remove(&schedule->queue, i);
-        return;
-    }
-    bool ahead = look_ahead(schedule, i, steps, &next);
-    if (needs_another_method(schedule, i))
-        return;
-    Prediction found = (Prediction)engine->status->prediction;
     if (ahead && found == PREDICTION_QUIET && next >= limit) {
         part->halts = 0;
         queue_remove(&schedule->queue, i);
@@ -187,13 +185,30 @@ static void predict(Schedule *schedule, uint32_t i, double steps)
 
 void schedule_predict(Schedule *schedule, uint32_t i)
 {
-    predict(schedule, i, engine_options(schedule_at(schedule, i))->look_ahead_steps);
+    Part *part = &schedule->parts[i];
+    double next;
+    schedule->work++;
+    part->unsure = part->far = false;
+    part->reach = 1.0;
+    if (part->t >= limit_of(schedule, i)) {
+        queue_remove(&schedule->queue, i);
+        return;
+    }
+    bool ahead = look(schedule, i, false, part->t, &next);
+    if (!needs_another_method(schedule, i))
+        note(schedule, i, ahead, next);
 }
 
-void schedule_predict_far(Schedule *schedule, uint32_t i, double steps)
+void schedule_predict_further(Schedule *schedule, uint32_t i, double most)
 {
-    predict(schedule, i, steps);
-    schedule->parts[i].far = true;
+    Part *part = &schedule->parts[i];
+    double next, known = schedule->queue.times[i];
+    schedule->work++;
+    bool ahead = look(schedule, i, true, known, &next);
+    if (needs_another_method(schedule, i))
+        return;
+    note(schedule, i, ahead, next);
+    part->far = part->unsure && (!(next > known) || ++part->reach >= most);
 }
 
 bool schedule_signals(Schedule *schedule, uint32_t i, double *values)

@@ -44,7 +44,8 @@ typedef struct {
     bool touched, pending;
     bool due;                     /* its own event has come; it has not had its turn yet */
     bool unsure;                  /* its place in the queue is where its look ahead ended, no event */
-    bool far;                     /* it has looked ahead as far as it may */
+    bool far;                     /* it has looked ahead as far as it may, */
+    double reach;                 /* over so many times the steps of one look ahead */
     uint32_t halts;               /* looks ahead in a row that have found that its run ends */
 } Part;
 
@@ -144,9 +145,9 @@ bool schedule_over(Schedule *schedule, uint32_t part);
 double schedule_instant(const Schedule *schedule, uint32_t i, double t);
 /* Brings a part to the target, or to the first event before it; whether it has one there. */
 bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event);
-/* Looks ahead from where a part is, some steps far; or (far) as far as `steps` of the solver. */
+/* Looks ahead from where a part is, some steps far; or as many on from where it has looked, `most` times in all. */
 void schedule_predict(Schedule *schedule, uint32_t i);
-void schedule_predict_far(Schedule *schedule, uint32_t i, double steps);
+void schedule_predict_further(Schedule *schedule, uint32_t i, double most);
 /* The signals of a part as they are; false, and the run is over, if they cannot be computed. */
 bool schedule_signals(Schedule *schedule, uint32_t i, double *values);
 
