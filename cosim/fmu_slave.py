@@ -124,7 +124,13 @@ class FmuSlave(Slave):
         return self._running.reader(names)
 
     def writer(self, name: str) -> Callable[[Any], None]:
-        """See `Block.writer`."""
+        """See `Block.writer`.
+
+        Raises
+        ------
+        MisfitError
+            Later, if a value is none of the variable's type.
+        """
         variable, full_name, put = self._variable(name), f"{self.name}.{name}", self._running.writer(name)
         any_float = variable.type in ANY_FLOAT
 

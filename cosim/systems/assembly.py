@@ -14,6 +14,7 @@ from cosim.slave import Slave
 from cosim.system import System
 from cosim.systems.automaton_files import find_automaton
 from cosim.systems.definition import FMU, Component, SystemDefinition
+from cosim.systems.plugs import unplugged
 from fmu.importer.loading import read_description
 from hybrid_model.named_objects import imports_from
 
@@ -43,7 +44,7 @@ def assemble(
     Raises
     ------
     CosimError
-        If an FMU cannot be used; MisfitError if a value or a connection does not fit.
+        If an FMU cannot be used; MisfitError if a value, a connection or a terminal does not fit.
     UsageError, ExportError
         If an automaton cannot be found or made.
     """
@@ -51,7 +52,8 @@ def assemble(
     for component, slave in zip(definition.components, slaves, strict=True):
         for name, value in component.start.items():
             set_start(slave, name, value)
-    return System(slaves, definition.connections, loop_iterations=loop_iterations)
+    connections = unplugged(definition, {slave.name: slave for slave in slaves})
+    return System(slaves, connections, loop_iterations=loop_iterations)
 
 
 def set_start(slave: Slave, name: str, value: Any) -> None:
