@@ -65,6 +65,7 @@ class FmuSlave(Slave):
         self.has_event_mode = bool(getattr(interface, "hasEventMode", False))
         self.can_restore = bool(interface.canGetAndSetFMUstate)
         self.variable_step = bool(getattr(interface, "canHandleVariableCommunicationStepSize", True))
+        self.direct = self._variables.direct(description.outputs or ())
         # FMI asks FMUs to name their time events. Ours name the first of all, unless an input may move those on states.
         self.foresees = self._file.ours and all(port.discrete for port in inputs)
         self.stops_after_events = self._file.stops_after_events

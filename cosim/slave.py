@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 from cosim.errors import MisfitError
@@ -83,6 +84,8 @@ class Slave(Block):
     """Whether steps may differ in length."""
     internal_step: float | None = None
     """Length in s of the steps that its solver makes, if they have one: between them its outputs stand still."""
+    direct: Mapping[str, Collection[str]] = MappingProxyType({})
+    """Output -> inputs that it depends on at once, as far as the block says; scalars that are no elements of arrays."""
     default_start_time: float | None = None
     default_stop_time: float | None = None
     default_step: float | None = None

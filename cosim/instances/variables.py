@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -52,6 +52,21 @@ class FmuVariables:
     def ports(self, causality: str) -> list[Port]:
         """Return the inputs or the outputs."""
         return [port for v in self._variables if v.causality == causality for port in self._ports(v)]
+
+    def direct(self, outputs: Iterable[Any]) -> dict[str, list[str]]:
+        """Return the inputs that outputs depend on at once, of scalars and where the description says which.
+
+        Parameters
+        ----------
+        outputs : iterable of fmpy.model_description.Unknown
+        """
+        told = {
+            unknown.variable.name: unknown.dependencies or () for unknown in outputs if not unknown.variable.dimensions
+        }
+        return {
+            name: [v.name for v in dependencies if v.causality == "input" and not v.dimensions]
+            for name, dependencies in told.items()
+        }
 
     @property
     def tunable(self) -> list[str]:

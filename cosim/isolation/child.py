@@ -13,7 +13,7 @@ from cosim.exchange_slave import ExchangeSlave
 from cosim.fmu_slave import FmuSlave
 
 FACTS = (
-    *("inputs", "outputs", "clocks", "tunable", "has_event_mode", "can_restore", "variable_step", "foresees"),
+    *("inputs", "outputs", "clocks", "tunable", "has_event_mode", "can_restore", "variable_step", "foresees", "direct"),
     *(
         "default_start_time",
         "default_stop_time",

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import CosimError, MisfitError
+from cosim.feedthrough import refuse_loops
 from cosim.masters.changes import Changes, Given
 from cosim.masters.event_iteration import iterate_events
 from cosim.masters.macro_step import MacroSteps, Outcome
@@ -89,6 +90,7 @@ def run_error_controlled(
     require_times(t_start, t_stop, output_interval, "output interval")
     if not 0.0 < tolerance < 1.0:
         raise CosimError(f"the tolerance is {tolerance}: give a number between 0 and 1, such as 1e-9.")
+    refuse_loops(system)
     system = _with_rollback(system)
     changes = Changes(system, inputs or {}, t_start)
     result = CosimResult(t=t_start, watch=watch)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cosim.errors import CosimError
+from cosim.feedthrough import told_loop
 from cosim.masters.changes import Changes
 from cosim.masters.signal_history import SignalHistory
 from cosim.slave import Slave
@@ -137,10 +138,10 @@ class MacroSteps:
                     system.slaves[connection.target].set(connection.input, value)
             before = values
         assert before is not None
-        changed = next(c for c, a, b in zip(self._flows, before, self._carried(), strict=True) if a != b)
+        changed = [c for c, a, b in zip(self._flows, before, self._carried(), strict=True) if a != b]
         raise CosimError(
-            f"the signals at t = {t:.9g} s do not settle: {changed} and others depend on each other at once, in a "
-            "loop. Break it by a state, or have it iterated."
+            f"the signals at t = {t:.9g} s do not settle: {told_loop(changed)} in which they depend on each other at "
+            "once. Break it by a state, or have it iterated."
         )
 
     def _carried(self) -> list[float]:

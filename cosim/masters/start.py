@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from cosim.errors import CosimError
+from cosim.feedthrough import in_order, told_loop
 from cosim.masters.changes import Changes
 from cosim.result import CosimResult
 from cosim.system import Connection, System
@@ -57,14 +58,14 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool 
         slave.start(t_start, t_stop, events=wanted, early=events is None and not wanted)
     changes.set_start_values()
     known: dict[tuple[str, str], float] = {}
+    connections = in_order(system)
     for _ in range(system.most_rounds):
-        changed = [c for c in system.connections if transfer_start(system, c, known)]
+        changed = [c for c in connections if transfer_start(system, c, known)]
         if not changed:
             break
     else:
         raise CosimError(
-            f"the start values do not settle: {changed[0]} and others form a loop. Break it by a state, or have it "
-            "iterated."
+            f"the start values do not settle: {told_loop(changed)}. Break it by a state, or have it iterated."
         )
     for slave in system.slaves.values():
         slave.begin()
