@@ -1,5 +1,6 @@
-/* Networks with random wires between parts of one model, run in pieces of random length, two threads with two networks
-   each: what happens must not depend on the pieces, nor on who else runs.  Prints the number of events. */
+/* Networks with random wires between parts of one model, which are given values from outside too, run in pieces of
+   random length, two threads with two networks each: what happens must not depend on the pieces, nor on who else runs.
+   Prints the number of events. */
 #include <math.h>
 #include <pthread.h>
 #include <stdio.h>
@@ -11,6 +12,7 @@
 #define GROUPS 2
 #define MOST_PARTS 40
 #define END 2.0
+#define CHANGES 12
 
 typedef struct {
     uint64_t state;
@@ -90,6 +92,55 @@ static void note(Task *task, EventLog *log)
     log->count = 0;
 }
 
+typedef struct {
+    double t, value;
+    uint32_t part, input;
+} Change;
+
+static void draw_changes(Change *changes, Dice *dice, size_t n_parts)
+{
+    for (size_t k = 0; k < CHANGES; k++) {
+        /* Two in three come together with another one, or with breakpoints of the parts. */
+        double when = k % 3 == 0 ? (double)k + 0.9 * roll(dice) : (double)(k / 3) * 3.0;
+        changes[k] = (Change){.t = END * when / CHANGES, .value = 2.0 * roll(dice) - 1.0,
+                              .part = (uint32_t)pick(dice, n_parts), .input = (uint32_t)pick(dice, model.n_inputs)};
+        if (k > 0 && changes[k].t < changes[k - 1].t)
+            changes[k].t = changes[k - 1].t;
+    }
+}
+
+/* A part does not look beyond the next of its changes from number k on. */
+static void look_until(Schedule *schedule, const Change *changes, size_t k, uint32_t part)
+{
+    while (k < CHANGES && changes[k].part != part)
+        k++;
+    schedule_at(schedule, part)->status->stop_time = k < CHANGES ? changes[k].t : END;
+}
+
+static bool give(Schedule *schedule, const Change *changes, size_t k)
+{
+    look_until(schedule, changes, k + 1, changes[k].part);
+    return schedule_receive(schedule, changes[k].part, BANK_INPUT, changes[k].input, changes[k].value) &&
+           schedule_iterate(schedule, schedule->t);
+}
+
+/* To the time of each change, and to the end, in pieces. */
+static ScheduleEnd go_on(Task *task, Schedule *schedule, const Change *changes, Dice *pieces)
+{
+    ScheduleEnd end = SCHEDULE_REACHED;
+    for (size_t k = 0; k <= CHANGES && end == SCHEDULE_REACHED; k++) {
+        do {
+            note(task, &schedule->log);
+            size_t work = 1 + pick(pieces, 50);
+            end = k < CHANGES ? schedule_approach(schedule, changes[k].t, work) : schedule_advance(schedule, END, work);
+        } while (end == SCHEDULE_GOING);
+        if (k < CHANGES && end == SCHEDULE_REACHED && !give(schedule, changes, k))
+            end = schedule->end;
+    }
+    note(task, &schedule->log);
+    return end;
+}
+
 static void run_network(Task *task)
 {
     Dice dice = {task->seed}, pieces = {task->pieces};
@@ -102,19 +153,19 @@ static void run_network(Task *task)
         wiring->groups[i] = (uint32_t)pick(&dice, GROUPS);
     wire(wiring, &dice, model.n_inputs);
     Schedule *schedule = schedule_create(GROUPS, models, n_sent, sent, wiring->n_parts, wiring->groups);
-    schedule->keeps = LOG_SIGNALS;
+    schedule->keeps = task->seed % 3 == 0 ? LOG_INSTANTS : LOG_SIGNALS;
     schedule->wires = (Wires){wiring->first, wiring->signals, wiring->targets, wiring->inputs};
     for (size_t group = 0; group < GROUPS; group++) {
         schedule->groups[group].engine->options.look_ahead_steps = 1.0 + (double)pick(&dice, 4);
         place(schedule, group, &dice);
     }
-    task->failed = !schedule_start(schedule, 0.0, END, true) || !schedule_begin(schedule);
-    ScheduleEnd end = SCHEDULE_GOING;
-    while (!task->failed && end == SCHEDULE_GOING) {
-        note(task, &schedule->log);
-        end = schedule_advance(schedule, END, 1 + pick(&pieces, 50));
-    }
-    note(task, &schedule->log);
+    Change changes[CHANGES];
+    draw_changes(changes, &dice, wiring->n_parts);
+    task->failed = !schedule_start(schedule, 0.0, END, true);
+    for (uint32_t i = 0; i < wiring->n_parts; i++)
+        look_until(schedule, changes, 0, i);
+    task->failed = task->failed || !schedule_begin(schedule);
+    ScheduleEnd end = task->failed ? schedule->end : go_on(task, schedule, changes, &pieces);
     task->failed = task->failed || end != SCHEDULE_REACHED;
     if (task->failed)
         fprintf(stderr, "seed %llu: end %d, %s %s\n", (unsigned long long)task->seed, (int)end, schedule->message,
