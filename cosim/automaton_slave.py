@@ -11,7 +11,7 @@ from cosim.errors import CosimError, MisfitError
 from cosim.slave import Port, Slave
 from fmu.importer.values import Value
 from hybrid_model import Automaton, Execution, Solver, ZenoGuard
-from hybrid_model.declare.arguments import require_choice
+from hybrid_model.declare.arguments import require_automaton, require_choice
 from hybrid_model.declare.layout import Layout, layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import Kind, element_names
@@ -46,6 +46,7 @@ class AutomatonSlave(Slave):
 
     def __init__(self, name: str, automaton: Automaton, solver: Solver | None = None, *, engine: str = "auto") -> None:
         require_choice("engine", engine, ENGINES)
+        require_automaton("AutomatonSlave", automaton)
         layout = layout_of(automaton)
         ports: dict[Kind, list[Port]] = {kind: [] for kind in Kind}
         for variable in automaton.variables:

@@ -94,7 +94,8 @@ class FlowFunctions:
                 )
             self._begin(description, folder, dict(start or {}), t_start)
         except Exception as error:
-            raise FlowError(f"{path} cannot be run: {error}") from error
+            why = error.strerror if isinstance(error, OSError) and error.strerror else error
+            raise FlowError(f"{path} cannot be run: {str(why).rstrip('.')}.") from error
 
     def derivatives(self, t: float, x: npt.ArrayLike, u: npt.ArrayLike = ()) -> FloatArray:
         """Return dx/dt, shape (n,), at time t in s, states x (n,) and inputs u (m,)."""

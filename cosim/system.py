@@ -12,6 +12,7 @@ from cosim.errors import MisfitError
 from cosim.rounds import reading_round
 from cosim.slave import Port, Slave
 from cosim.sources import Linear, Source
+from hybrid_model.declare.real_numbers import told
 
 SETTLED = 1e-14
 """Part of a signal by which it may change and still have settled in a loop that is iterated."""
@@ -57,7 +58,7 @@ class System:
     ----------
     slaves : sequence of Slave
         With distinct names; the order is the order in which simultaneous events are handled.
-    connections : mapping
+    connections : mapping, optional
         ``"slave.input"`` -> ``"slave.output"``; for vectors too, if both have the same elements, or to a sequence of
         names for the elements; or to `Linear`, for numbers. Inputs not named keep their start values.
     loop_iterations : int
@@ -67,11 +68,18 @@ class System:
     Raises
     ------
     MisfitError
-        For unknown names, two slaves of one name, units or elements that differ, a continuous signal on a discrete
-        input, or text on an input for numbers.
+        For what are no slaves or connections, unknown names, two slaves of one name, units or elements that differ, a
+        continuous signal on a discrete input, or text on an input for numbers.
     """
 
-    def __init__(self, slaves: Sequence[Slave], connections: Mapping[str, Source], *, loop_iterations: int = 0) -> None:
+    def __init__(
+        self, slaves: Sequence[Slave], connections: Mapping[str, Source] | None = None, *, loop_iterations: int = 0
+    ) -> None:
+        connections = {} if connections is None else connections
+        if not (isinstance(slaves, Sequence) and all(isinstance(slave, Slave) for slave in slaves)):
+            raise MisfitError(f"the slaves are {told(slaves)}: give a list of FmuSlave(name, path) and others.")
+        if not isinstance(connections, Mapping):
+            raise MisfitError(f'the connections are {told(connections)}: write {{"slave.input": "slave.output"}}.')
         self.loop_iterations = loop_iterations
         self.slaves = {slave.name: slave for slave in slaves}
         if len(self.slaves) < len(slaves):
@@ -322,3 +330,17 @@ def _require_type(source: str, output: Port, target: str, input_: Port) -> None:
 
 def _number(places: Sequence[str]) -> str:
     return f"the elements {places[0]} to {places[-1]}" if places else "no elements"
+
+
+def require_system(caller: str, given: object) -> None:
+    """Refuse what is no system where a master wants one.
+
+    Raises
+    ------
+    MisfitError
+        With what to write.
+    """
+    if not isinstance(given, System):
+        raise MisfitError(
+            f"{caller} was given a {type(given).__name__}: write {caller}(System(slaves, connections), t_stop)."
+        )

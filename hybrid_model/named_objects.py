@@ -46,6 +46,9 @@ def named_object(target: str, folder: str | os.PathLike[str] = "") -> object:
         If the module is there and fails when it is imported.
     """
     module, _, name = target.rpartition(":")
+    if not name or not module:
+        form = f"{module}:ClassName" if module else "module:ClassName or file.py:ClassName"
+        raise NamingError(f"{target} names no {'class' if module else 'module'}: write {form}.")
     if module.endswith(_SOURCE):
         module = os.path.join(folder, module)
     try:

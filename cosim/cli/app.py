@@ -47,5 +47,6 @@ def _require_free(port: int) -> None:
             tried.bind(("127.0.0.1", port))
         except (OSError, OverflowError) as error:
             raise UsageError(
-                f"the page cannot be served at port {port} of this machine: {error}; give another one, --port N."
+                f"the page cannot be served at port {port} of this machine: {str(error).rstrip('.')}; give another "
+                "one, --port N."
             ) from error

@@ -22,3 +22,10 @@ def status_of(error: Exception) -> Exit | None:
     if isinstance(error, (ScenarioError, NamingError)):
         return Exit.USAGE
     return Exit.FAILED if isinstance(error, (HybridModelError, ExportError, BuildError, CosimError, OSError)) else None
+
+
+def sentence_of(error: Exception) -> str:
+    """Return what people are told of an error: its message, and of the system's errors the file and what to do."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror}. Give a file or a folder that you may read or write."
+    return str(error)

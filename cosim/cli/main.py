@@ -64,12 +64,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(Exit.DONE)
     except Exception as error:
         # Most of what may be raised is imported by whoever raises it.
-        from cosim.cli.failures import status_of
+        from cosim.cli.failures import sentence_of, status_of
 
         failed = status_of(error)
         if failed is None:
             raise
-        print(f"hybrid-fmu: {error}", file=sys.stderr)
+        print(f"hybrid-fmu: {sentence_of(error)}", file=sys.stderr)
         return int(failed)
 
 
@@ -128,8 +128,9 @@ class _Parser(argparse.ArgumentParser):
     def _not_taken(self, word: str) -> str:
         if word.startswith("-"):
             known = [option for action in self._actions for option in action.option_strings]
-            near = difflib.get_close_matches(word, known, n=1)
-            meant = f" Did you mean '{near[0]}'?" if near else ""
+            # Without the dashes, which all have in common.
+            near = difflib.get_close_matches(word.lstrip("-"), [option.lstrip("-") for option in known], n=1)
+            meant = f" Did you mean '--{near[0]}'?" if near else ""
             return f"'{self.prog}' has no option '{word}'.{meant} '{self.prog} --help' lists those that there are."
         taken = [str(action.metavar) for action in self._actions if not action.option_strings]
         if not taken:

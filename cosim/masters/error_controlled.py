@@ -17,7 +17,7 @@ from cosim.masters.start import MOST_STEPS, outputs, require_times, sample_chang
 from cosim.masters.treatments import with_rollback
 from cosim.replayed_slave import ReplayedSlave
 from cosim.result import CosimResult, Watch
-from cosim.system import System
+from cosim.system import System, require_system
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.schedule.blocks import Termination
 from hybrid_model.schedule.scheduler import Event
@@ -87,6 +87,7 @@ def run_error_controlled(
     CosimError
         If a slave fails, gets no further, or the signals between slaves form a loop without a state.
     """
+    require_system("run_error_controlled", system)
     require_times(t_start, t_stop, output_interval, "output interval")
     if not 0.0 < tolerance < 1.0:
         raise CosimError(f"the tolerance is {tolerance}: give a number between 0 and 1, such as 1e-9.")

@@ -12,7 +12,7 @@ from cosim.masters.queues import queue_of
 from cosim.masters.start import apart_from_the_rest, outputs, require_times, sample_change, sample_end, start_slaves
 from cosim.masters.treatments import exactly
 from cosim.result import CosimResult, Watch
-from cosim.system import System
+from cosim.system import System, require_system
 from hybrid_model.errors import SchedulingError
 from hybrid_model.schedule.blocks import StiffPart
 from hybrid_model.schedule.scheduler import Scheduler
@@ -66,6 +66,7 @@ def run_event_exact(
     CosimError
         If a slave fails, or asks for event iterations without end.
     """
+    require_system("run_event_exact", system)
     require_times(t_start, t_stop, output_interval, "output interval")
     _require_discrete(system)
     _refuse_curves(inputs or {})

@@ -12,7 +12,7 @@ from cosim.masters.start import outputs, require_times, sample_end, start_slaves
 from cosim.masters.treatments import by_fixed_steps
 from cosim.result import CosimResult, Watch
 from cosim.rounds import Ending, stepping_round
-from cosim.system import System
+from cosim.system import System, require_system
 
 ORDERS = ("jacobi", "gauss-seidel")
 ROUNDING = 1e-9
@@ -70,6 +70,7 @@ def run_fixed_step(
     MisfitError
         If the last step is shorter, and a slave takes steps of one length only, or if a name of `inputs` cannot be set.
     """
+    require_system("run_fixed_step", system)
     require_times(t_start, t_stop, step, "communication step")
     require_times(t_start, t_stop, output_interval, "output interval")
     if isinstance(record, (bool, str)):

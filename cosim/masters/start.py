@@ -12,6 +12,7 @@ from cosim.feedthrough import in_order, told_loop
 from cosim.masters.changes import Changes
 from cosim.result import CosimResult
 from cosim.system import Connection, System
+from hybrid_model.declare.real_numbers import is_real
 
 MOST_STEPS = 100_000_000
 """Most steps of one run."""
@@ -25,6 +26,9 @@ def require_times(t_start: float, t_stop: float, interval: float | None, what: s
     CosimError
         With the value and the rule.
     """
+    for value in (t_start, t_stop, 0.0 if interval is None else interval):
+        if not is_real(value):
+            raise CosimError(f"{value!r} is no time: give a number of seconds.")
     if not (math.isfinite(t_start) and math.isfinite(t_stop) and t_stop > t_start):
         raise CosimError(f"the run goes from {t_start} to {t_stop} s: give finite times, the stop after the start.")
     if interval is not None and not (math.isfinite(interval) and interval > 0):

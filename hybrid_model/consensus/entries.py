@@ -20,8 +20,9 @@ _LIMIT = 2**63
 
 def suggestion(name: str, known: Iterable[str]) -> str:
     """`` Did you mean '...'?`` with the nearest of the `known` names, or nothing if none is near."""
-    nearest = difflib.get_close_matches(name, list(known), n=1)
-    return f" Did you mean '{nearest[0]}'?" if nearest else ""
+    by_small_letters = {each.lower(): each for each in known}
+    nearest = difflib.get_close_matches(name.lower(), list(by_small_letters), n=1)
+    return f" Did you mean '{by_small_letters[nearest[0]]}'?" if nearest else ""
 
 
 class Entries:

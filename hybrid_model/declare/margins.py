@@ -68,4 +68,7 @@ def _some(margins: tuple[Value, ...]) -> tuple[Value, ...]:
         raise DeclarationError(
             "no margin is given to least or greatest: write least(first, second), or *margins for a list."
         )
+    text = next((margin for margin in margins if isinstance(margin, str)), None)
+    if text is not None:
+        raise DeclarationError(f"{text!r} is no margin: least and greatest take numbers, such as s.h.")
     return margins

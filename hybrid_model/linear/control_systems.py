@@ -12,6 +12,7 @@ import control
 import numpy as np
 import numpy.typing as npt
 
+from hybrid_model.declare.arguments import require_automaton
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.state_space import LinearAutomaton, state_space
 from hybrid_model.declare.variables import FloatArray, Kind, Values, element_names, start_array, unknown_name
@@ -54,6 +55,7 @@ def flow_system(automaton: Automaton, z: Mapping[str, npt.ArrayLike] | None = No
     a late pulse in a table of inputs, in silence. ``solve_ivp_kwargs={"max_step": ...}`` with the shortest interval of
     the table, or the shortest pulse, prevents that.
     """
+    require_automaton("flow_system", automaton)
     point = OperatingPoint(automaton)
     layout = point.layout
     for name, value in (z or {}).items():
@@ -127,6 +129,7 @@ def linearise(
     Derivatives are extrapolated central differences, see `hybrid_model.linear.jacobian`: exact to rounding for affine
     flows.
     """
+    require_automaton("linearise", automaton)
     point = OperatingPoint(automaton)
     layout = point.layout
     for name, value in (at or {}).items():
@@ -279,7 +282,7 @@ def lti(
         For a system of another class, an improper transfer function, a sampling period that is not known, and names
         that are no Python identifiers.
     """
-    called = name or system.name
+    called: str = name or str(getattr(system, "name", system))
     if not isinstance(system, (control.StateSpace, control.TransferFunction)):
         raise DeclarationError(
             f"{called} is a {type(system).__name__}: give a control.StateSpace or control.TransferFunction "

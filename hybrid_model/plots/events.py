@@ -164,6 +164,8 @@ def event_times(events: Events, names: tuple[str, ...]) -> dict[str, FloatArray]
     if isinstance(events, HybridArc):
         chosen = names or tuple(info.name for info in events.automaton.jumps if not info.internal)
         return {name: events.event_times(name) for name in chosen}
+    if not isinstance(events, Mapping):
+        raise DeclarationError(f'{events!r} is neither a run nor a mapping: give an arc, or {{"name": times}}.')
     for name in names:
         if name not in events:
             raise DeclarationError(unknown_name("the mapping of events", name, events))

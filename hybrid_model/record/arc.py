@@ -292,13 +292,13 @@ class HybridArc:
         return np.diff(self.event_times(name))
 
     def before(self, jump: JumpRecord) -> Values:
-        """Return all values just before a jump of this arc."""
-        flow = self._flow_of(jump.j)
+        """Return all values just before a jump of this arc; DeclarationError for what is no jump."""
+        flow = self._flow_of(_index_of(jump))
         return self._read.values(flow.t1, flow.at(flow.t1), flow.z)
 
     def after(self, jump: JumpRecord) -> Values:
-        """Return all values just after a jump of this arc."""
-        flow = self._flow_of(jump.j + 1)
+        """Return all values just after a jump of this arc; DeclarationError for what is no jump."""
+        flow = self._flow_of(_index_of(jump) + 1)
         return self._read.values(flow.t0, flow.x0, flow.z)
 
     @property
@@ -443,3 +443,9 @@ def _interval(what: str, given: Interval | None) -> Interval:
     if not a <= b:
         raise DeclarationError(f"the interval {what} = ({given[0]}, {given[1]}) is empty: give its start first.")
     return a, b
+
+
+def _index_of(jump: JumpRecord) -> int:
+    if not isinstance(jump, JumpRecord):
+        raise DeclarationError(f"{jump!r} is no jump of an arc: give one of arc.jumps, such as arc.jumps[0].")
+    return jump.j

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybrid_model.declare.arguments import require_automaton
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.layout import not_finite
 from hybrid_model.declare.signals import Inputs
@@ -81,6 +82,7 @@ class Point:
         inputs: Inputs | None = None,
         solver: Solver | None = None,
     ) -> None:
+        require_automaton(type(self).__name__, automaton)
         if not math.isfinite(t_start):
             raise SimulationError(f"the start time of {automaton.name} is {t_start}: give a finite number.")
         self.automaton = automaton

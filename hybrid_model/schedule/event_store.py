@@ -141,7 +141,10 @@ def load_network_events(folder: str | Path) -> NetworkEvents:
             raise DataError(f"{folder} has the events of another version of this program.")
         columns = _mapped(folder, int(about.pop("width")))
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise DataError(f"{folder} has no events of a network: {error}.") from error
+        why = error.strerror if isinstance(error, OSError) else error
+        raise DataError(
+            f"{folder} has no events of a network: {why}. Give the folder that simulate_network(events_to=...) wrote."
+        ) from error
     return NetworkEvents.of_columns(columns, **about)
 
 

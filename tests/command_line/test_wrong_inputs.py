@@ -14,11 +14,13 @@ import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
 from cosim.cli.main import main
 from cosim.errors import CosimError
+from cosim.flow_functions import FlowError, FlowFunctions
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.system import System
 from fmu.errors import BuildError, ExportError
 from fmu.export import export_fmu
+from hybrid_model import consensus, linear, plots
 from hybrid_model.consensus import ScenarioError, load_scenario, read_scenario
 from hybrid_model.models import BouncingBall
 
@@ -135,7 +137,7 @@ SLIPS = table("wrong_code.txt")
 @pytest.mark.parametrize(("slip", "answer"), SLIPS, ids=[row[0] for row in SLIPS])
 def test_what_is_written(slip, answer, folder, monkeypatch):
     monkeypatch.chdir(folder)
-    with pytest.raises((hm.HybridModelError, ScenarioError, ExportError, BuildError, CosimError)) as raised:
+    with pytest.raises((hm.HybridModelError, ScenarioError, ExportError, BuildError, CosimError, FlowError)) as raised:
         eval(slip, globals())
     assert str(raised.value).startswith(answer)
     read(str(raised.value))

@@ -70,27 +70,35 @@ def require_named(options: argparse.Namespace) -> None:
     target = options.target
     if Path(target).suffix.lower() == ".fmu":
         raise UsageError(f"{target} is an FMU already: 'hybrid-fmu cosim {target}' runs it.")
-    if Path(target).suffix.lower() == ".py":
-        raise UsageError(f"{target} names no class: write {target}:ClassName{_classes(Path(target))}.")
+    if target.removesuffix(":").endswith(".py"):
+        raise _no_class(target.removesuffix(":"))
     if ":" not in target or Path(target).suffix.lower() == ".toml":
-        meant = _with_colon(target)
-        if meant:
-            raise UsageError(f"{target} is no scenario: for a class write {meant}.")
+        _require_no_class_meant(target)
         require_scenario(argparse.Namespace(scenario=target))
 
 
-def _with_colon(target: str) -> str:
-    """What was meant by a class behind a dot, ``plant.py:Tank`` by ``plant.Tank``; nothing if there is no module."""
-    module, _, name = target.rpartition(".")
-    if not (module and name.isidentifier()) or Path(target).exists():
-        return ""
-    if module.endswith(".py") or Path(f"{module}.py").is_file():
-        return f"{module.removesuffix('.py')}.py:{name}"
-    parts = module.split(".")
-    inside = Path(*parts).with_suffix(".py")
-    if inside.is_file() or (all(map(str.isidentifier, parts)) and find_spec(parts[0]) is not None):
-        return f"{module}:{name}"
-    return ""
+def _require_no_class_meant(target: str) -> None:
+    """Refuse what is nearly a class: ``plant.Tank`` for ``plant.py:Tank``, ``plant``, or the name of a model."""
+    if Path(target).exists() or not all(map(str.isidentifier, target.split("."))):
+        return
+    if Path(f"{target}.py").is_file():
+        raise _no_class(f"{target}.py")
+    module, _, name = target.removesuffix(".py").rpartition(".")
+    if Path(f"{module.removesuffix('.py')}.py").is_file():
+        raise UsageError(f"{target} is no scenario: for a class write {module.removesuffix('.py')}.py:{name}.")
+    if module and find_spec(module.partition(".")[0]) is not None:
+        if name[:1].islower():
+            raise _no_class(target)
+        raise UsageError(f"{target} is no scenario: for a class write {module}:{name}.")
+    if target[:1].isupper():
+        from hybrid_model import models
+
+        if target in models.__all__:
+            raise UsageError(f"{target} is no scenario: for the model write hybrid_model.models:{target}.")
+
+
+def _no_class(module: str) -> UsageError:
+    return UsageError(f"{module} names no class: write {module}:ClassName{_classes(Path(module))}.")
 
 
 def _classes(file: Path) -> str:

@@ -56,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_most_jumps(parser, "a run")
     parser.add_argument(
         "--table",
+        "--out",
         type=Path,
         metavar="F.sqlite",
         help="file of the rows; a sweep that ended early is gone on with (default: the scenario's name)",

@@ -21,7 +21,7 @@ from hybrid_model.consensus.certificates.notes import scenario_notes
 from hybrid_model.consensus.certificates.observation import observe
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.runs.report import report_of
-from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario, require_scenario
 
 __all__ = ["Certificates", "certify"]
 
@@ -104,6 +104,7 @@ def certify(
         Of the same network with this or another trigger, or with other initial states: what it knows is not computed
         again. Tree, window, resolution and patience are its own then.
     """
+    require_scenario("certify", scenario)
     cycle = union_time(scenario)
     general = network_hypotheses(scenario, cycle)
     if len(connected_components(scenario, cycle)) > 1:

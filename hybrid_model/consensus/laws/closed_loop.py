@@ -11,7 +11,7 @@ from hybrid_model.consensus.laws.agents import ContinuousIntegrator, Integrator,
 from hybrid_model.consensus.laws.channels import LossyChannel, link_seeds
 from hybrid_model.consensus.laws.event_generators import Surroundings, event_generator
 from hybrid_model.consensus.messages import ScenarioError
-from hybrid_model.consensus.scenario.definition import Scenario, Weights
+from hybrid_model.consensus.scenario.definition import Scenario, Weights, require_scenario
 from hybrid_model.consensus.scenario.own_trigger import OwnTrigger
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.function import FunctionWeight, TimeFunction
@@ -50,8 +50,9 @@ def scenario_agents(scenario: Scenario, motion: type[hm.HybridAutomaton] | None 
     Raises
     ------
     ScenarioError
-        If the trigger cannot be had with the scenario's weights or channel, or `motion` is no such class.
+        If `scenario` is none, the trigger cannot be had with its weights or channel, or `motion` is no such class.
     """
+    require_scenario("scenario_agents", scenario)
     if motion is not None and not (isinstance(motion, type) and issubclass(motion, Integrator)):
         raise ScenarioError(f"motion is {motion!r}; give a class derived from hybrid_model.consensus.Integrator.")
     if motion is not None and scenario.trigger.kind is TriggerKind.CONTINUOUS:
@@ -100,8 +101,7 @@ def closed_loop(
     ScenarioError
         If `scenario` is no scenario, such as the name of one, or one of the others is not what it must be.
     """
-    if not isinstance(scenario, Scenario):
-        raise ScenarioError(f"closed_loop was given {scenario!r}: write closed_loop(load_scenario(name or path)).")
+    require_scenario("closed_loop", scenario)
     if trigger is not None:
         own = trigger if isinstance(trigger, Trigger) else OwnTrigger(law=trigger)
         scenario = replace(scenario, trigger=own)

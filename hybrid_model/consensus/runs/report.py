@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid_model import HybridArc, NetworkRun
 from hybrid_model.consensus.laws.closed_loop import agent_name
-from hybrid_model.consensus.scenario.definition import Scenario
+from hybrid_model.consensus.scenario.definition import Scenario, require_scenario
 from hybrid_model.declare.variables import FloatArray
 
 
@@ -74,7 +74,13 @@ def run_report(scenario: Scenario, arc: HybridArc) -> RunReport:
         What ran.
     arc : HybridArc
         The run of `closed_loop(scenario)`.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is none.
     """
+    require_scenario("run_report", scenario)
     names = [agent_name(i) for i in range(1, scenario.network.agents + 1)]
     samples = arc.samples([f"{name}.x" for name in names])
     states = np.array([samples[f"{name}.x"] for name in names])

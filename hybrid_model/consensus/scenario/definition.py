@@ -210,3 +210,15 @@ def _require_positive(name: str, value: float) -> None:
     _require_finite(name, value)
     if value <= 0:
         raise ScenarioError(f"{name} is {value}; it must be positive.")
+
+
+def require_scenario(caller: str, given: object) -> None:
+    """Refuse the name of a scenario, or something else, where a scenario is wanted.
+
+    Raises
+    ------
+    ScenarioError
+        With what to write.
+    """
+    if not isinstance(given, Scenario):
+        raise ScenarioError(f"{caller} was given {shown(given)}: write {caller}(load_scenario(name or path)).")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hybrid_model.consensus.entries import Entries
-from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.messages import ScenarioError, shown
 from hybrid_model.consensus.scenario.channel import IDEAL, Channel
 from hybrid_model.consensus.scenario.definition import Network, Scenario, Weights, replace_trigger
 from hybrid_model.consensus.scenario.own_trigger import read_own_trigger
@@ -40,6 +40,8 @@ def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     ScenarioError
         If there is no such preset or file, the file is not TOML, or it breaks a rule; the message names the entry.
     """
+    if not isinstance(name_or_path, (str, os.PathLike)):
+        raise ScenarioError(f"load_scenario was given {shown(name_or_path)}: give the name of a preset, or a path.")
     other = _with_other_trigger(name_or_path)
     if other is not None:
         return replace(replace_trigger(load_scenario(other[0]), other[1]), name=os.fspath(name_or_path))

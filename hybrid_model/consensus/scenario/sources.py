@@ -8,6 +8,7 @@ from typing import Any
 
 from hybrid_model.consensus.entries import suggestion
 from hybrid_model.consensus.messages import ScenarioError
+from hybrid_model.consensus.scenario.trigger import TriggerKind
 
 __all__ = ["preset_names", "scenario_source"]
 
@@ -32,8 +33,10 @@ def scenario_source(name_or_path: str | os.PathLike[str]) -> tuple[str, dict[str
     names = preset_names()
     if name in names:
         return f"preset '{name}'", _parsed(f"preset '{name}'", (_PRESETS / f"{name}.toml").read_bytes()), Path()
+    # With the name of a trigger behind it a preset is another scenario.
+    known = [*names, *(f"{preset}-{kind.value}" for preset in names for kind in TriggerKind)]
     raise ScenarioError(
-        f"there is no preset '{name}'.{suggestion(name, names)} Presets: {', '.join(names)}; "
+        f"there is no preset '{name}'.{suggestion(name, known)} Presets: {', '.join(names)}; "
         "a scenario file is given by a path that ends in .toml."
     )
 

@@ -173,6 +173,10 @@ class Trigger:
 
     def __post_init__(self) -> None:
         """Check the values."""
+        if not isinstance(self.kind, TriggerKind):
+            raise ScenarioError(
+                f"the kind of a trigger is {self.kind!r}; give a member of TriggerKind, such as DYNAMIC."
+            )
         numbers = _LAWS[self.kind].numbers
         for key in (field.name for field in fields(self) if field.name != "kind"):
             value = getattr(self, key)

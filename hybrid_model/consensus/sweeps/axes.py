@@ -15,6 +15,8 @@ from hybrid_model.consensus.sweeps.keys import Key
 
 __all__ = ["Axis", "Choice", "Range", "Seeds", "as_axis", "read_axis"]
 
+MOST_RUNS = 10_000_000
+"""More are a slip."""
 SEED_LIMIT = 2**31 - 1
 """Seeds are below this, as those of channels must be."""
 
@@ -110,6 +112,10 @@ class Range(Axis):
             raise SweepError(f"{self.key} goes from {self.low} on a logarithmic axis: begin above zero.")
         if self.count is not None and self.count < 2:
             raise SweepError(f"{self.key} has {self.count} values: a range has two ends, so give 2 or more.")
+        if self.count is not None and self.count > MOST_RUNS:
+            raise SweepError(
+                f"{self.key} has {self.count} values; a sweep can have at most {MOST_RUNS} runs: give fewer."
+            )
 
     def on_grid(self) -> list[Any]:
         """See `Axis.on_grid`."""

@@ -11,13 +11,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from hybrid_model.consensus.sweeps.axes import Axis, Seeds, spawned_seeds
+from hybrid_model.consensus.sweeps.axes import MOST_RUNS, Axis, Seeds, spawned_seeds
 from hybrid_model.consensus.sweeps.errors import SweepError
 
 __all__ = ["Design", "points_of"]
-
-MOST_RUNS = 10_000_000
-"""So many runs are a slip."""
 
 
 class Design(enum.Enum):

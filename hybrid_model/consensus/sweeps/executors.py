@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import re
 import signal
 import threading
 from concurrent.futures import Executor, ProcessPoolExecutor
@@ -118,6 +119,8 @@ class DaskCluster:
             raise SweepError(
                 'a scheduler needs Dask: install it with pip install "hybrid-fmu[dask]", or leave the scheduler out.'
             ) from error
+        if not re.fullmatch(r"\S+:\d{1,5}|inproc://\S+", address):
+            raise SweepError(f"'{address}' is no address of a Dask scheduler: write tcp://HOST:PORT.")
         try:
             # Untyped, as all of Dask is.
             make: Any = Client

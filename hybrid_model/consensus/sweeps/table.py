@@ -72,8 +72,7 @@ class SweepTable:
             other = next((key for key in given if kept.get(key) != given[key]), None)
             if other is not None:
                 raise SweepError(
-                    f"{self.path} holds another sweep: its {other} is not that of this one. Name another file, or "
-                    "delete it."
+                    f"{self.path} holds another sweep, with another entry '{other}'. Name another file, or delete it."
                 )
         return study or Study.from_dict(kept)
 

@@ -16,6 +16,7 @@ from hybrid_model.consensus.clocks.intervals import not_negative
 from hybrid_model.consensus.clocks.over_time import require
 from hybrid_model.consensus.clocks.rows import RowAutomaton, RowClock, check_rows
 from hybrid_model.consensus.entries import Entries
+from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.weights.edge_automata import EdgeAutomaton
 from hybrid_model.consensus.weights.primitive import Primitive
 from hybrid_model.consensus.weights.tabulated import common_clock
@@ -133,6 +134,8 @@ class FunctionWeight(Waveform):
 
     Raises
     ------
+    ScenarioError
+        If it is no function.
     ValueError
         If the function is negative by more than rounding, not finite or not periodic at one of the times at which this
         is tried out, or the kinks do not ascend within one period.
@@ -145,6 +148,8 @@ class FunctionWeight(Waveform):
 
     def __post_init__(self) -> None:
         """Try the function out."""
+        if not callable(self.function):
+            raise ScenarioError(f"the weight is {self.function!r}, no function: write lambda t: ..., in numpy style.")
         if self.period is not None:
             require("period", self.period, self.period > 0, "must be positive")
         if self.kinks:

@@ -303,7 +303,7 @@ def test_an_executor_that_was_given_and_broke_is_said_to_be_so(many, tmp_path):
 def test_a_file_of_another_sweep_or_of_something_else_is_refused(many, small, tmp_path):
     path = tmp_path / "a.sqlite"
     SweepTable(path, many).close()
-    with pytest.raises(SweepError, match="holds another sweep: its axes is not that of this one"):
+    with pytest.raises(SweepError, match="holds another sweep, with another entry 'axes'"):
         SweepTable(path, study(small, ["trigger.threshold=0.1,0.2"], bounds=many.frame.bounds))
     assert Study.from_dict(json.loads(json.dumps(many.as_dict()))) == many
     other = tmp_path / "other.sqlite"
@@ -382,5 +382,5 @@ def test_dask_gives_the_same_table_after_a_worker_was_killed(many, expected, tmp
 
 def test_a_scheduler_that_does_not_answer_is_said_to_be_so(many, tmp_path):
     pytest.importorskip("distributed")
-    with pytest.raises(SweepError, match="no Dask scheduler answers at nowhere://x"):
-        run_sweep(many, tmp_path / "a.sqlite", scheduler="nowhere://x")
+    with pytest.raises(SweepError, match="no Dask scheduler answers at nowhere://x:1"):
+        run_sweep(many, tmp_path / "a.sqlite", scheduler="nowhere://x:1")
