@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.errors import CosimError, MisfitError
-from cosim.slave import Port, Slave
+from cosim.slave import Measure, Port, Slave
 from fmu.importer.values import Value
+from fmu.standard.units import base_unit
 from hybrid_model import Automaton, Execution, Solver, ZenoGuard
 from hybrid_model.declare.arguments import require_automaton, require_choice
 from hybrid_model.declare.layout import Layout, layout_of
@@ -54,7 +55,10 @@ class AutomatonSlave(Slave):
             elements = element_names(variable)
             array = "" if elements == [variable.name] else variable.name
             ports[variable.kind] += [
-                Port(name, variable.unit, discrete, whole=variable.integer, array=array) for name in elements
+                Port(
+                    name, variable.unit, discrete, whole=variable.integer, array=array, measure=_measure(variable.unit)
+                )
+                for name in elements
             ]
         outputs = [
             port
@@ -212,6 +216,11 @@ class AutomatonSlave(Slave):
         if self._block is None:
             raise CosimError(f"{self.name} has not been started: call start first.")
         return self._block
+
+
+def _measure(unit: str) -> Measure | None:
+    known = base_unit(unit) if unit else None
+    return None if known is None else Measure(known.exponents, known.factor, known.offset)
 
 
 def _is_output(automaton: Automaton, element: str) -> bool:

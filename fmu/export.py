@@ -14,10 +14,10 @@ from fmu.build.binaries import binaries, fmi_headers, own_files, runtime_sources
 from fmu.build.fmu_code import fmu_code
 from fmu.build.source_files import source_names
 from fmu.describe.description import Description, model_identifier
-from fmu.describe.units import nearest_unit
 from fmu.describe.variable_table import fmu_variables
 from fmu.describe.variables import Fmi
 from fmu.errors import ExportError
+from fmu.standard.units import nearest_unit
 from hybrid_model import Automaton, Network
 from hybrid_model.declare.arguments import require_automaton
 from hybrid_model.declare.calls import explained

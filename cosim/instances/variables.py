@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from cosim.slave import Measure, Port
+from fmu.standard.units import BASE_UNITS
 from fmu.standard.value_types import DISCRETE, INTEGERS, TYPES
 
 KINDS = {"String": "text", "Binary": "bytes", "Boolean": "truth"}
 """What ports of these types carry; those of all others carry numbers."""
 STRUCTURAL = "structuralParameter"
-_BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 class FmuVariables:
@@ -106,5 +106,5 @@ class FmuVariables:
 def _measure(base: Any) -> Measure | None:
     if base is None:
         return None
-    exponents = tuple(int(getattr(base, name) or 0) for name in _BASE_UNITS)
+    exponents = tuple(int(getattr(base, name) or 0) for name in BASE_UNITS)
     return Measure(exponents, float(base.factor or 1.0), float(base.offset or 0.0))

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from fmu.describe.units import BASE_UNITS, base_unit
+from fmu.standard.units import BASE_UNITS, base_unit
 from hybrid_model import Automaton
 from hybrid_model.declare.variables import Kind, Variable
 

@@ -10,10 +10,10 @@ from fmu.describe.description import TOLERANCE, Description, start_text, summary
 from fmu.describe.dialects import DIALECTS, Dialect
 from fmu.describe.model_structure import Unknown
 from fmu.describe.quantities import display_attributes, quantity
-from fmu.describe.units import base_unit
 from fmu.describe.variables import Bank, Fmi, FmiType, FmuVariable
 from fmu.describe.xml_text import number, to_bytes, xml_text
 from fmu.standard.capabilities import declared
+from fmu.standard.units import base_unit
 from hybrid_model import __version__
 
 LOG_CATEGORIES = {

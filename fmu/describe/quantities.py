@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fmu.describe.units import base_unit
+from fmu.standard.units import base_unit
 
 
 @dataclass(frozen=True)

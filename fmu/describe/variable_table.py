@@ -10,9 +10,9 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from fmu.describe.units import unit_per_second
 from fmu.describe.variables import NEXT_EVENT, STOP_AT_EVENTS, Bank, Fmi, FmiType, FmuVariable
 from fmu.errors import ExportError
+from fmu.standard.units import unit_per_second
 from hybrid_model import Automaton
 from hybrid_model.declare.layout import Layout, Place
 from hybrid_model.declare.transitions import Trigger

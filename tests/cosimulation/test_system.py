@@ -154,6 +154,24 @@ def test_units_that_measure_differently_are_refused():
         System(slaves, {"receiver.u": "sender.sent"})
 
 
+class Hears(Receives):
+    u = hm.Input(0.0, unit="km", discrete=True)
+
+
+class Warm(Receives):
+    u = hm.Input(0.0, unit="degC", discrete=True)
+
+
+def test_automata_measure_as_their_fmus_do(tmp_path):
+    sender = AutomatonSlave("sender", Sender(sent=101.0))
+    result = run_event_exact(System([sender, AutomatonSlave("receiver", Hears())], {"receiver.u": "sender.sent"}), 1.0)
+    assert result.final["receiver.y"] == 0.101
+    with pytest.raises(MisfitError, match=r"is in 'm', but receiver\.u is in 'degC', and they measure differently"):
+        System([sender, AutomatonSlave("receiver", Warm())], {"receiver.u": "sender.sent"})
+    fmu = FmuSlave("receiver", export_fmu(Warm(), tmp_path / "warm.fmu", kinds=("cs",)))
+    assert fmu.inputs["u"].measure == AutomatonSlave("receiver", Warm()).inputs["u"].measure == CELSIUS
+
+
 def test_measures_of_fmus_are_those_that_they_declare(tmp_path):
     path = export_fmu(BouncingBall(), tmp_path / "ball.fmu", kinds=("cs",))
     ports = FmuSlave("ball", path).outputs

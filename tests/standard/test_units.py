@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fmu.describe.quantities import display_attributes, quantity
-from fmu.describe.units import BASE_UNITS, base_unit, nearest_unit, unit_per_second
+from fmu.standard.units import BASE_UNITS, base_unit, nearest_unit, unit_per_second
 
 
 def in_base_units(**exponents):
