@@ -160,12 +160,16 @@ class _Reading:
                 values[target] = _scaled(value, factor, offset)
         return values
 
-    def _set(self, root: Any) -> dict[str, str]:
-        values = {}
+    def _set(self, root: Any) -> dict[str, str | list[str]]:
+        values: dict[str, str | list[str]] = {}
         for parameter in _children_of(next(iter(_children(root, "Parameters")), ()), "Parameter"):
-            typed = next((child for child in parameter if child.get("value") is not None), None)
-            if typed is not None:
-                values[parameter.get("name")] = typed.get("value")
+            is_array, name = bool(_children(parameter, "Dimension")), parameter.get("name")
+            for typed in parameter:
+                listed = [element.get("value") for element in _children(typed, "Value")]
+                if listed:
+                    values[name] = listed if is_array else listed[0]
+                elif typed.get("value") is not None:
+                    values[name] = typed.get("value").split() if is_array else typed.get("value")
         return values
 
     def _mapping(self, binding: Any) -> dict[str, tuple[str, float, float]]:
@@ -200,6 +204,8 @@ def _told(node: Node) -> str:
 
 
 def _scaled(value: Any, factor: float, offset: float) -> Any:
+    if isinstance(value, list):
+        return [_scaled(one, factor, offset) for one in value]
     return value if (factor, offset) == (1.0, 0.0) else factor * float(value) + offset
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from lxml import etree
 from cosim.errors import MisfitError
 from cosim.slave import Port, Slave
 from cosim.sources import Linear
-from cosim.system import System
+from cosim.system import Connection, System
 from cosim.systems.definition import FMU, SystemDefinition
 from cosim.systems.ssp_reading import DESCRIPTION, VERSIONS
 from fmu.archives.writing import package
@@ -96,6 +96,7 @@ def _description(definition: SystemDefinition, system: System, version: str) -> 
     names = {"ssd": SSD, "ssc": SSC, "ssv": SSV}
     root = etree.Element(f"{{{SSD}}}SystemStructureDescription", nsmap=names, version=version, name=definition.name)
     whole = _add(root, SSD, "System", name=definition.name)
+    whole_arrays = _whole_arrays(definition, system) if version == "2.0" else set()
     elements = _add(whole, SSD, "Elements")
     for component in definition.components:
         slave = system.slaves[component.name]
@@ -109,31 +110,100 @@ def _description(definition: SystemDefinition, system: System, version: str) -> 
         )
         connectors = _add(element, SSD, "Connectors")
         for kind, ports in (("input", slave.inputs), ("output", slave.outputs)):
-            for port in ports.values():
-                connector = _add(connectors, SSD, "Connector", name=port.name, kind=kind)
+            for name, port, shape in _connectors(component.name, ports, whole_arrays):
+                connector = _add(connectors, SSD, "Connector", name=name, kind=kind)
                 _add(connector, SSC, _port_type(port))
+                _add_dimensions(connector, shape)
         if component.start:
             bindings = _add(_add(element, SSD, "ParameterBindings"), SSD, "ParameterBinding")
             values = _add(bindings, SSD, "ParameterValues")
             parameters = _add(
                 _add(values, SSV, "ParameterSet", version=version, name=f"{component.name}-start"), SSV, "Parameters"
             )
-            for variable, value in _scalars(slave, component.start):
-                parameter = _add(parameters, SSV, "Parameter", name=variable)
-                _add(parameter, SSV, _type(value), value=_text(value))
+            for variable, value in component.start.items():
+                _add_parameters(parameters, slave, variable, value, in_arrays=version == "2.0")
     if system.connections:
-        connections = _add(whole, SSD, "Connections")
-        for wire in system.connections:
-            ends = {"startElement": wire.source, "startConnector": wire.output}
-            element = _add(connections, SSD, "Connection", **ends, endElement=wire.target, endConnector=wire.input)
-            linear = _linear(definition, f"{wire.target}.{wire.input}")
-            if linear is not None:
-                _add(element, SSC, "LinearTransformation", factor=repr(linear.factor), offset=repr(linear.offset))
+        _add_connections(_add(whole, SSD, "Connections"), definition, system, whole_arrays)
     times = {"startTime": definition.experiment.start_time, "stopTime": definition.experiment.stop_time}
     given = {name: repr(value) for name, value in times.items() if value is not None}
     if given:
         _add(root, SSD, "DefaultExperiment", **given)
     return root
+
+
+def _add_connections(
+    parent: Any, definition: SystemDefinition, system: System, whole_arrays: set[tuple[str, str]]
+) -> None:
+    told = set[tuple[str, str]]()
+    for wire in system.connections:
+        output, into = wire.output, wire.input
+        if (wire.target, _arrays(system, wire)[1]) in whole_arrays:
+            output, into = _arrays(system, wire)
+        if (wire.target, into) in told:
+            continue
+        told.add((wire.target, into))
+        ends = {"startElement": wire.source, "startConnector": output, "endElement": wire.target, "endConnector": into}
+        element = _add(parent, SSD, "Connection", **ends)
+        linear = _linear(definition, f"{wire.target}.{into}")
+        if linear is not None:
+            _add(element, SSC, "LinearTransformation", factor=repr(linear.factor), offset=repr(linear.offset))
+
+
+def _whole_arrays(definition: SystemDefinition, system: System) -> set[tuple[str, str]]:
+    """Return the arrays, by slave and name, that no connection takes apart: their own connectors are enough."""
+    arrays = {
+        (slave.name, port.array)
+        for slave in system.slaves.values()
+        for port in (*slave.inputs.values(), *slave.outputs.values())
+        if port.array
+    }
+    ends = [((wire.source, a), (wire.target, b)) for wire in system.connections for a, b in [_arrays(system, wire)]]
+    named = {name for name, source in definition.connections.items() if not isinstance(source, list)}
+    apart = {end for pair in ends if ".".join(pair[1]) not in named for end in pair}
+    # What one connection takes apart is so at the other ends of its other connections too.
+    while more := {end for pair in ends if apart & set(pair) for end in pair} - apart:
+        apart |= more
+    return arrays - apart
+
+
+def _arrays(system: System, wire: Connection) -> tuple[str, str]:
+    """Return the arrays that an output and an input are elements of, or nothing."""
+    return system.slaves[wire.source].outputs[wire.output].array, system.slaves[wire.target].inputs[wire.input].array
+
+
+def _connectors(
+    slave: str, ports: Mapping[str, Port], whole_arrays: set[tuple[str, str]]
+) -> Iterator[tuple[str, Port, Sequence[str]]]:
+    """Yield connectors with their names, a port each, and the shapes of arrays."""
+    last = {port.array: port for port in ports.values() if (slave, port.array) in whole_arrays}
+    for port in ports.values():
+        if port.array not in last:
+            yield port.name, port, ()
+        elif last[port.array] is port:
+            yield port.array, port, _shape(port.name, port.array)
+
+
+def _shape(last: str, array: str) -> Sequence[str]:
+    """Return the shape of an array whose last element is called ``array[2,3]``."""
+    return last[len(array) + 1 : -1].split(",")
+
+
+def _add_dimensions(parent: Any, shape: Sequence[str]) -> None:
+    for size in shape:
+        _add(parent, SSC, "Dimension", size=size)
+
+
+def _add_parameters(parent: Any, slave: Slave, name: str, value: Any, *, in_arrays: bool) -> None:
+    scalars = list(_scalars(slave, {name: value}))
+    kinds = {_type(v) for _, v in scalars}
+    kinds = {"Real"} if kinds == {"Real", "Integer"} else kinds
+    if not in_arrays or scalars[0][0] == name or len(kinds) > 1 or kinds & {"String", "Binary"}:
+        for variable, one in scalars:
+            _add(_add(parent, SSV, "Parameter", name=variable), SSV, _type(one), value=_text(one))
+        return
+    parameter = _add(parent, SSV, "Parameter", name=name)
+    _add(parameter, SSV, kinds.pop(), value=" ".join(_text(one) for _, one in scalars))
+    _add_dimensions(parameter, _shape(scalars[-1][0], name))
 
 
 def _linear(definition: SystemDefinition, target: str) -> Linear | None:

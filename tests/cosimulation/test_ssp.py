@@ -7,11 +7,14 @@ import pytest
 from lxml import etree
 
 import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
 from cosim.cli.main import main
 from cosim.errors import MisfitError
 from cosim.masters import run_fixed_step
 from cosim.sources import Linear
+from cosim.system import System
 from cosim.systems.assembly import assemble
+from cosim.systems.definition import Component, SystemDefinition
 from cosim.systems.files import read_system
 from cosim.systems.ssp_reading import read_ssp
 from cosim.systems.ssp_writing import write_osp, write_ssp
@@ -221,3 +224,46 @@ def test_a_folder_for_libcosim_names_everything(stranger, tmp_path):
     assert root.xpath("//o:InitialValue[@variable='rate']/o:Real/@value", namespaces=names) == ["2.0"]
     assert root.xpath("//o:VariableConnection/o:Variable/@name", namespaces=names) == ["sent", "int32_in"]
     assert (tmp_path / "osp" / "a.fmu").is_file()
+
+
+class Sends(hm.HybridAutomaton):
+    table = hm.DiscreteState([[1.0, 2.0], [3.0, 4.0]], output=True)
+    pair = hm.DiscreteState([5.0, 6.0], output=True)
+    free = hm.DiscreteState([7.0, 8.0, 9.0], output=True)
+
+
+class Takes(hm.HybridAutomaton):
+    table = hm.Input([[0.0, 0.0], [0.0, 0.0]], discrete=True)
+    pair = hm.Input([0.0, 0.0], discrete=True)
+
+
+def test_arrays_are_connectors_of_version_2_where_no_connection_takes_them_apart(stranger, tmp_path):
+    """The FMUs in the file stand for others: a system in this process has the arrays."""
+    wires = {"b.table": Linear("a.table", 2.0, 1.0), "b.pair": ["a.pair[2]", "a.pair[1]"]}
+    system = System([AutomatonSlave("a", Sends()), AutomatonSlave("b", Takes())], wires)
+    definition = SystemDefinition("arrays", [Component(name, "fmu", str(stranger())) for name in "ab"], wires)
+    for version, expected in (
+        ("2.0", {"table": ["2", "2"], "pair[1]": [], "pair[2]": [], "free": ["3"]}),
+        ("1.0", {f"table[{i},{j}]": [] for i in (1, 2) for j in (1, 2)}),
+    ):
+        path = write_ssp(definition, system, tmp_path / f"arrays{version}.ssp", version)
+        with zipfile.ZipFile(path) as archive:
+            root = etree.fromstring(archive.read("SystemStructure.ssd"))
+        shapes = {c.get("name"): [d.get("size") for d in c.iterfind("{*}Dimension")] for c in root.iter("{*}Connector")}
+        assert shapes.items() >= expected.items()
+        assert ("table" in shapes) == (version == "2.0")
+        again = System(list(system.slaves.values()), read_ssp(path).connections)
+        assert set(again.connections) == set(system.connections)
+
+
+def test_arrays_of_parameters_are_one_parameter_of_version_2(stranger, tmp_path, capsys):
+    (tmp_path / "system.toml").write_text(f"[components.a]\nfmu = '{stranger()}'\nstart.weights = [2.5, 4]\n")
+    for version, names in (("1.0", ["weights[1]", "weights[2]"]), ("2.0", ["weights"])):
+        path = tmp_path / f"weights{version}.ssp"
+        command = ["cosim", str(tmp_path / "system.toml"), "--save-as", str(path), "--ssp-version", version]
+        assert main([*command, "--stop-time", "1"]) == 0
+        with zipfile.ZipFile(path) as archive:
+            root = etree.fromstring(archive.read("SystemStructure.ssd"))
+        assert [parameter.get("name") for parameter in root.iter("{*}Parameter")] == names
+        assert main(["cosim", str(path)]) == 0
+        assert "a.total = 6.5" in capsys.readouterr().out
