@@ -51,6 +51,7 @@ format: $(READY)
 	$(BIN)/ruff check --fix .
 
 $(READY): pyproject.toml constraints.txt
+	@echo "Setting up $(VENV) with the packages of constraints.txt: some two minutes, the first time only."
 	$(PYTHON) -m venv $(VENV)
 	PIP_CONSTRAINT=constraints.txt $(BIN)/pip install --quiet --disable-pip-version-check -e ".[dev]"
 	touch $(READY)

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -116,3 +117,41 @@ def test_each_extra_can_be_installed(extra, built, tmp_path):
     lines = run(python, tmp_path / "env" / "bin" / "hybrid-fmu", "doctor").stdout.splitlines()
     (line,) = [line for line in lines if line.startswith(f"extra      {extra}:")]
     assert "missing" not in line
+
+
+def interpreter(version):
+    """A Python of that version that runs, on the path or as pyenv keeps it; None if there is none."""
+    kept = sorted(Path.home().glob(f".pyenv/versions/{version}.*/bin/python"))
+    for found in (shutil.which(f"python{version}"), *kept):
+        if found and subprocess.run([found, "--version"], capture_output=True, check=False).returncode == 0:
+            return found
+    return None
+
+
+REUSE = """
+from dataclasses import replace
+from hybrid_model.consensus import closed_loop, load_scenario
+from hybrid_model.native.free_values.snapshots import snapshot
+paper = load_scenario("paper-a")
+other = replace(paper, network=replace(paper.network, initial=(1.0, 2.0, 3.0, 4.0)))
+print(snapshot(closed_loop(paper)).key == snapshot(closed_loop(other)).key)
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("version", ["3.12", "3.13", "3.14"])
+def test_with_another_python_it_runs(version, built, tmp_path):
+    found = interpreter(version)
+    if found is None:
+        pytest.skip(f"needs python{version}")
+    subprocess.run([found, "-m", "venv", str(tmp_path / "env")], check=True, capture_output=True)
+    python, command = (tmp_path / "env" / "bin" / name for name in ("python", "hybrid-fmu"))
+    run(python, "-m", "pip", "install", "-q", "-c", ROOT / "constraints.txt", built[1])
+    assert "native: its maps are compiled" in run(python, command, "doctor").stdout
+    out = run(python, command, "export", "paper-a", "--out", tmp_path / "fmus").stdout.split()
+    assert "sound: 0 errors" in run(python, command, "validate", out[0]).stdout.lower()
+    wrong = subprocess.run([python, command, "simulate", "paper-a", "--stop", "1"], capture_output=True, text=True)
+    assert wrong.returncode == 2
+    assert "'hybrid-fmu simulate' has no option '--stop'. Did you mean '--stop-time'?" in wrong.stderr
+    # What a map reads is read off its bytecode, which differs between versions.
+    assert run(python, "-c", REUSE).stdout == "True\n"

@@ -36,7 +36,7 @@ _HIDDEN = frozenset(
     {"__module__", "__doc__", "__dict__", "__weakref__", "__slots__", "__annotations__", "__qualname__", "_abc_impl"}
     | {"__orig_bases__", "__parameters__", "__abstractmethods__", "__dataclass_fields__", "__dataclass_params__"}
     | {"__firstlineno__", "__static_attributes__", "__annotate__", "__annotate_func__", "__annotations_cache__"}
-    | {"__classdictcell__"}
+    | {"__classdictcell__", "__replace__"}
 )
 """What Python keeps in a class for itself: read only where code names it."""
 _LARGE = 1 << 63
