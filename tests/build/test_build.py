@@ -79,7 +79,7 @@ def compiled(log: Path) -> list[str]:
 
 @posix
 def test_the_runtime_is_compiled_once(logged, empty_cache, tmp_path):
-    sources = runtime_sources()
+    sources = runtime_sources()[:6]
     for k in range(3):
         source = tmp_path / str(k) / "model.c"
         source.parent.mkdir()

@@ -1,16 +1,24 @@
-"""The C files of every FMU, by what their objects define and ask for: no circles, and names with an owner."""
+"""The C files of every FMU, by what their objects define and ask for: no circles, names with an owner, no state."""
 
 import re
 import shutil
 import subprocess
 from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
 
 import pytest
+from witnesses import Mix
 
+import cosim
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files
+from fmu.build.fmu_code import fmu_code
+from fmu.describe.variable_table import fmu_variables
+from fmu.describe.variables import Fmi
 from hybrid_model.native.build.compiler import find_compiler
-from hybrid_model.native.build.objects import COMMON_FLAGS, STRICT_FLAGS
+from hybrid_model.native.build.objects import COMMON_FLAGS, GENERATED_FLAGS, STRICT_FLAGS
+from hybrid_model.native.networks.network import trace_any
 
+ROUNDS = Path(cosim.__file__).with_name("rounds.c")
 pytestmark = pytest.mark.skipif(not shutil.which("nm"), reason="needs nm")
 PREFIXES = {
     "engine": "engine_",
@@ -25,22 +33,40 @@ def room_of(source):
     return "engine" if source.parent.name in ("location", "methods") else source.parent.name
 
 
-def symbols(source, folder):
-    """Names that the object of a C file defines for others, and those that it asks for."""
+def compiled(source, folder, flags=(*COMMON_FLAGS, *STRICT_FLAGS, "-Werror")):
+    """The object of a C file. Users' compilers may warn of more than ours, which has to be content."""
     target = folder / f"{source.stem}.o"
     includes = [*(f"-I{place}" for place in OWN_FOLDERS), "-isystem", str(fmi_headers())]
-    # Users' compilers may warn of more than ours, which has to be content.
-    flags = [*COMMON_FLAGS, *STRICT_FLAGS, "-Werror"]
     subprocess.run([*find_compiler(), *flags, "-c", source, *includes, "-o", target], check=True)
-    lines = subprocess.run(["nm", "-g", target], capture_output=True, text=True, check=True).stdout.splitlines()
-    found = [line.split()[-2:] for line in lines]
-    return {name for kind, name in found if kind != "U"}, {name for kind, name in found if kind == "U"}
+    return target
+
+
+def names_in(target, *options):
+    """What nm says of an object file, line by line."""
+    return subprocess.run(["nm", *options, target], capture_output=True, text=True, check=True).stdout.splitlines()
 
 
 @pytest.fixture(scope="module")
-def objects(tmp_path_factory):
+def files(tmp_path_factory):
+    """The object of each C file, a master's own one too."""
     folder = tmp_path_factory.mktemp("objects")
-    return {source: symbols(source, folder) for source in own_files("*.c")}
+    return {source: compiled(source, folder) for source in [*own_files("*.c"), ROUNDS]}
+
+
+@pytest.fixture(scope="module")
+def symbols(files):
+    """Names that the object of a C file defines for others, and those that it asks for."""
+    lines = {source: [line.split()[-2:] for line in names_in(target, "-g")] for source, target in files.items()}
+    return {
+        source: ({name for kind, name in found if kind != "U"}, {name for kind, name in found if kind == "U"})
+        for source, found in lines.items()
+    }
+
+
+@pytest.fixture(scope="module")
+def objects(symbols):
+    """The same of the C files of FMUs."""
+    return {source: both for source, both in symbols.items() if source != ROUNDS}
 
 
 def calls(objects, room):
@@ -90,3 +116,61 @@ def test_names_that_leave_a_file_tell_whose_they_are(objects):
         prefix = PREFIXES[room_of(source)]
         strange = {name for name in defined if not re.match(rf"_?({prefix}|fmi[23])", name)}
         assert not strange, source.name
+
+
+# Functions of the C library that the runtime may call: they keep no state that instances could share, but for the
+# memory functions, which are safe on threads.
+ALLOWED = {"calloc", "malloc", "realloc", "free", "memchr", "memcmp", "memcpy", "memmove", "memset"}
+ALLOWED |= {"snprintf", "vsnprintf"}
+ALLOWED |= {
+    "strcmp",
+    "strlen",
+    "strspn",
+    "floor",
+    "fmax",
+    "fmin",
+    "ldexp",
+    "nextafter",
+    "pow",
+    "sqrt",
+    "__stack_chk_fail",
+}
+
+
+def test_what_they_ask_of_the_c_library(symbols):
+    """No output, no files, no environment, no locale, no exit, no signal: nothing that is the host's."""
+    wanted = {name for _, names in symbols.values() for name in names}
+    defined = {name for names, _ in symbols.values() for name in names}
+    assert wanted - defined - {"model", "description", "_GLOBAL_OFFSET_TABLE_"} <= ALLOWED
+
+
+def writable(target):
+    """What an object file holds that a program can change: tables of pointers are read-only once they are relocated."""
+    rows = [[cell.strip() for cell in line.split("|")] for line in names_in(target, "--format=sysv")]
+    places = [(row[0], row[-1]) for row in rows if len(row) == 7]
+    return [
+        name
+        for name, place in places
+        if place.startswith((".data", ".bss", ".tdata", ".tbss", "*COM*")) and not place.startswith(".data.rel.ro")
+    ]
+
+
+def test_nothing_written_is_shared_by_instances(files):
+    for source, target in files.items():
+        assert writable(target) == [], source.name
+
+
+@pytest.mark.parametrize("fmi", [version.value for version in Fmi])
+def test_nothing_written_is_shared_by_instances_of_a_model(fmi, tmp_path):
+    traced = trace_any(Mix())
+    model = tmp_path / "model.c"
+    model.write_text(fmu_code(traced, fmu_variables(traced, Fmi(fmi)), "token", ("cs", "me")))
+    assert writable(compiled(model, tmp_path, (*COMMON_FLAGS, *GENERATED_FLAGS))) == []
+
+
+def test_what_can_be_written_is_seen(tmp_path):
+    source = tmp_path / "state.c"
+    source.write_text(
+        "static int a = 1; int b, *c = &b; const int d = 2; const int *const e = &d; int *f(void) { return &a; }"
+    )
+    assert sorted(writable(compiled(source, tmp_path, COMMON_FLAGS))) == ["a", "b", "c"]

@@ -1,15 +1,13 @@
-"""The runtime's C: warnings, static analysis, strict C99, stack, globals, and how thin the versions' layers are."""
+"""The runtime's C: warnings, static analysis, strict C99, stack, and how thin the versions' layers are."""
 
 import itertools
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from c_harness import VERSIONS, generated, run
-from c_witnesses import WITNESSES
+from c_harness import VERSIONS, run
 
 import cosim
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files, runtime_sources
@@ -69,52 +67,6 @@ def test_no_function_needs_much_stack(tmp_path):
                 where, size, kind = line.rsplit("\t", 2)
                 assert kind in ("static", "dynamic,bounded"), line
                 assert int(size) <= 4096, where
-
-
-@linux
-@pytest.mark.skipif(not shutil.which("nm"), reason="needs nm")
-@pytest.mark.parametrize("fmi", VERSIONS)
-def test_nothing_written_is_shared_by_instances(fmi, tmp_path):
-    """No object, the generated one included, has data of its own that can be written."""
-    model = tmp_path / "model.c"
-    model.write_text(generated(WITNESSES["mix"].automaton, fmi)[0])
-    # Without position independence, tables of pointers are constants for nm as well.
-    compile_all([model, *runtime_sources(fmi)], tmp_path, "-std=c99", "-O0", "-fno-pic", "-fno-pie")
-    for target in tmp_path.glob("*.o"):
-        writable = [line for line in run("nm", str(target)).splitlines() if re.search(r" [bBdDcCsSgG] ", line)]
-        assert writable == [], target.name
-
-
-# Functions of the C library that the runtime may call: they keep no state that instances could share, but for the
-# memory functions, which are safe on threads.
-ALLOWED = {"calloc", "malloc", "realloc", "free", "memchr", "memcmp", "memcpy", "memmove", "memset"}
-ALLOWED |= {"snprintf", "vsnprintf"}
-ALLOWED |= {
-    "strcmp",
-    "strlen",
-    "strspn",
-    "floor",
-    "fmax",
-    "fmin",
-    "ldexp",
-    "nextafter",
-    "pow",
-    "sqrt",
-    "__stack_chk_fail",
-}
-
-
-@linux
-@pytest.mark.skipif(not shutil.which("nm"), reason="needs nm")
-def test_what_it_asks_of_the_c_library(tmp_path):
-    """No output, no files, no environment, no locale, no exit, no signal: nothing that is the host's."""
-    compile_all(SOURCES, tmp_path, "-std=c99", "-O0", "-fPIC")
-    defined, wanted = {"model", "description"}, set()
-    for target in tmp_path.glob("*.o"):
-        for line in run("nm", str(target)).splitlines():
-            kind, name = line.split()[-2:]
-            (wanted if kind == "U" else defined).add(name)
-    assert wanted - defined - {"_GLOBAL_OFFSET_TABLE_"} <= ALLOWED
 
 
 def lines_of(path):

@@ -50,7 +50,7 @@ def test_its_checks_find_nothing(name, fmi, exported, caplog):
     assert "No semantic error" in caplog.text
 
 
-@pytest.mark.parametrize("fmi", VERSIONS)
+@pytest.mark.parametrize("fmi", [pytest.param("2.0", marks=pytest.mark.long), "3.0"])
 def test_it_builds_our_sources(fmi, exported, tmp_path):
     """Without the options of our build, and with the compiler that it finds."""
     if shutil.which("gcc") is None:

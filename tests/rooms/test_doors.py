@@ -5,13 +5,29 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("hybrid_model", "fmu", "cosim")
+DEFINITIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.ClassDef)
+
+
+def statements(tree, *, inside=True):
+    """The statements of a tree, those within others too, such as definitions; expressions are left alone."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.stmt):
+            yield node
+        if isinstance(node, (ast.stmt, ast.excepthandler)) and (inside or not isinstance(node, DEFINITIONS)):
+            yield from statements(node, inside=inside)
 
 
 def defined(tree):
-    """Names that a module gives a value itself, wherever in it."""
-    made = (ast.FunctionDef, ast.ClassDef)
-    names = {node.name for node in ast.walk(tree) if isinstance(node, made)}
-    return names | {n.id for n in ast.walk(tree) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+    """Names that a module gives a value itself."""
+    own = list(statements(tree, inside=False))
+    names = {node.name for node in own if isinstance(node, DEFINITIONS)}
+    return names | {
+        name.id
+        for node in own
+        if not isinstance(node, DEFINITIONS)
+        for name in ast.walk(node)
+        if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)
+    }
 
 
 def second_doors(modules, users):
@@ -20,7 +36,7 @@ def second_doors(modules, users):
     return [
         (file, node.module, alias.name)
         for file, tree in users.items()
-        for node in ast.walk(tree)
+        for node in statements(tree)
         if isinstance(node, ast.ImportFrom) and node.module in own
         for alias in node.names
         if alias.name not in own[node.module]
