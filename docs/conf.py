@@ -1,5 +1,6 @@
 """Sphinx: how the pages of this folder become the documentation site (`make docs`)."""
 
+import gc
 import sys
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import hybrid_model
 from hybrid_model.plots import JOURNAL
 
 sys.path.insert(0, str(Path(__file__).parent))
+gc.disable()  # trees of pages stay to the end: looking through them for garbage takes a quarter of all time
 
 project = "hybrid-fmu"
 author = "the authors of hybrid-fmu"

@@ -8,11 +8,12 @@ location of events to an importer. What they share is the automaton and nothing 
 import importlib
 import inspect
 import pkgutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from catalogue import cases
-from executions import reference, shown, starts, step_inputs, values_of
+from executions import python_run, reference, shown, starts, step_inputs, values_of
 from own_importer import exchange, step_through
 
 import hybrid_model as hm
@@ -28,6 +29,9 @@ from hybrid_model.declare.variables import Kind
 TIME_TOLERANCE = 1e-7
 STATE_TOLERANCE = 1e-8
 SAMPLES = 41
+
+# Models of seconds: a tenth of their run is verified by default, the whole with the long tests.
+SLOW_TO_VERIFY = ("paper", "agent", "control", "vehicle", "ring", "absolute", "moving_agents", "double_integrators")
 
 # The FMUs of FMI 2.0 are made for this test alone: a model of each kind in the quick run, all in the long one.
 QUICK = {
@@ -123,6 +127,23 @@ def test_native_run_agrees_with_python_run(name):
         # Of values above one, of them: the thermostat's 20 degC, van der Pol's v, which changes by 50 in a second.
         expected = plain.at(variable.name, between)
         np.testing.assert_allclose(fast.at(variable.name, between), expected, rtol=1e-10, atol=1e-10)
+
+
+@each_case
+def test_python_run_is_a_hybrid_arc(name):
+    case = cases()[name]
+    slow = name.startswith(SLOW_TO_VERIFY)
+    arc = python_run(replace(case, t_end=case.t_end / 10)) if slow else reference(name)
+    report = hm.verify(case.automaton, arc)
+    assert report.ok, str(report)
+    assert report.samples > 1
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name in cases() if name.startswith(SLOW_TO_VERIFY)])
+def test_whole_runs_of_networks_are_hybrid_arcs(name):
+    report = hm.verify(cases()[name].automaton, reference(name))
+    assert report.ok, str(report)
 
 
 # What importers of FMI 2.0 and of Model Exchange do: there are no clocks, so the log tells the jumps.

@@ -12,8 +12,6 @@ import fmpy
 import fmpy.util
 import numpy as np
 import pytest
-from catalogue import cases
-from executions import python_run, reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
@@ -30,8 +28,6 @@ from hybrid_model.errors import DeclarationError
 from hybrid_model.models import BouncingBall, RelayHysteresis, Thermostat, TwoTank
 
 G, E = 9.81, 0.7
-SLOW = ("paper", "agent", "control", "vehicle", "ring", "absolute", "moving_agents", "double_integrators")
-"""Models of seconds: a tenth of their run is verified by default, the whole with the long tests."""
 
 
 def rules(report):
@@ -50,24 +46,7 @@ def moved(samples, name, k, by):
     return changed(samples, **{name: value})
 
 
-# Hybrid arcs pass.
-
-
-@pytest.mark.parametrize("name", cases())
-def test_the_simulators_arcs_are_hybrid_arcs(name):
-    case = cases()[name]
-    slow = name.startswith(SLOW)
-    arc = python_run(dataclasses.replace(case, t_end=case.t_end / 10)) if slow else reference(name)
-    report = hm.verify(case.automaton, arc)
-    assert report.ok, str(report)
-    assert report.samples > 1
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", [name for name in cases() if name.startswith(SLOW)])
-def test_whole_runs_of_networks_are_hybrid_arcs(name):
-    report = hm.verify(cases()[name].automaton, reference(name))
-    assert report.ok, str(report)
+# Hybrid arcs pass: those of the engines do in tests/agreement.
 
 
 def ball_by_hand(impacts=3, shift=0.0, loss=E, points=5, height=1.0):
