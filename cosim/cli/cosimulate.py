@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.exits import Exit, exit_of, given_values
+from cosim.cli.hints import standing_still
 from cosim.cli.options.cosimulate import ERROR_CONTROLLED, EVENT_EXACT, FIXED_STEP, MASTERS
 from cosim.cli.outputs import results_folder
 from cosim.cli.progress import Work
@@ -197,13 +198,14 @@ def _run(system: System, options: argparse.Namespace, experiment: Experiment) ->
         raise
     finally:
         files.close()
+    # Files first: whoever reads the text may close it before its end.
+    status, compared = files.finish(result)
     if options.json:
-        status, compared = files.finish(result)
         print(json.dumps(_document(result, compared), indent=2))
     else:
-        print(_text(result))
-        status, compared = files.finish(result)
-        print(*compared, sep="\n", end="\n" * bool(compared))
+        print(_text(result), *compared, sep="\n")
+    if standing := standing_still(system, result):
+        print(f"hybrid-fmu: {standing}", file=sys.stderr)
     return max(exit_of(result.ended.name), status)
 
 

@@ -196,6 +196,8 @@ class _Run:
             outcome, values = self._attempt(t, end)
             if h <= 2.0 * self._resolution:
                 outcome.due |= self._jumped(before)
+                # Where nothing was in the way the accuracy was: signals that rise from zero are all surprise there.
+                self._h = MOST * h
                 self._arrive(end, values, outcome)
                 return
             if macro.meet_at_events and (outcome.quiet or outcome.believed):

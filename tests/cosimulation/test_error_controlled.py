@@ -207,3 +207,23 @@ def test_the_command_chooses_this_master_for_continuous_signals(tmp_path, capsys
     assert "ball.impact: 3 ticks" in said
     assert main(["cosim", str(tmp_path), "--master", "fixed-step", "--order", "gauss-seidel", "--stop-time", "1"]) == 0
     assert "others hear of them at the next communication point, up to 0.01 s late" in capsys.readouterr().out
+
+
+class Rises(hm.HybridAutomaton):
+    power = hm.Parameter(1.0)
+    y = hm.Output()
+
+    def outputs(self, s):
+        return {"y": s.t**s.power}
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0])
+def test_signals_that_rise_from_zero_get_on(power):
+    """x' = t^p from 0: x(1) = 1/(p + 1). All of such a signal is surprise at first, however short the step is."""
+    system = System(
+        [AutomatonSlave("rises", Rises(power=power)), AutomatonSlave("x", Integrates())], {"x.u": "rises.y"}
+    )
+    result = run_error_controlled(system, 1.0)
+    # Each step is within 1e-9 of the largest value so far.
+    assert result.final["x.x"] == pytest.approx(1.0 / (power + 1.0), abs=1e-6)
+    assert result.steps < 100_000

@@ -131,6 +131,46 @@ def test_a_slip_in_the_file_is_wrong_usage(old, new, folder, capsys):
     assert capsys.readouterr().err.count("\n") == 1
 
 
+STEPS = """
+import hybrid_model as hm
+
+class Steps(hm.HybridAutomaton):
+    count = hm.DiscreteState(0.0)
+    y = hm.Output({})
+
+    def outputs(self, s):
+        return {{"y": s.count + {} * s.t}}
+
+    def due(self, s):
+        return 0.3 * (s.count + 1.0)
+
+    transitions = (hm.TimeEvent("up", due, lambda self, s: {{"count": s.count + 1.0}}),)
+
+class Follows(hm.HybridAutomaton):
+    u = hm.Input(0.0)
+    x = hm.State(0.0, output=True)
+
+    def flow_map(self, s):
+        return {{"x": s.u}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("declared", "slope", "hinted"), [("", 0, True), ("", 0.1, False), ("discrete=True", 0, False)]
+)
+def test_outputs_that_change_at_events_alone_are_told(declared, slope, hinted, tmp_path, capsys):
+    (tmp_path / "steps.py").write_text(STEPS.format(declared, slope))
+    (tmp_path / "system.toml").write_text(
+        "experiment.stop_time = 1.0\n[components]\na.automaton = 'steps.py:Steps'\nb.automaton = 'steps.py:Follows'\n"
+        "[connections]\n'b.u' = 'a.y'\n"
+    )
+    assert main(["cosim", str(tmp_path), "--output-file", str(tmp_path / "out.csv")]) == 0
+    said = capsys.readouterr()
+    # Steps of 0.3 s: 0.3 (0 + 1 + 2) + 0.1 * 3, and the ramp; within the tolerance of some steps.
+    assert float(said.out.partition("b.x = ")[2]) == pytest.approx(1.2 + slope / 2.0, abs=1e-8)
+    assert ("a.y changed at events alone" in said.err) == hinted
+
+
 def test_a_master_that_there_is_not_is_refused(folder, capsys):
     assert main(["cosim", str(changed(folder, "stop_time = 2.2", 'stop_time = 2.2\nmaster = "best"'))]) == 2
     assert "the master 'best' is none of event-exact, error-controlled, fixed-step" in capsys.readouterr().err
