@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.exits import Exit, exit_of, given_values
-from cosim.cli.hints import standing_still
 from cosim.cli.options.cosimulate import ERROR_CONTROLLED, EVENT_EXACT, FIXED_STEP, MASTERS
 from cosim.cli.outputs import results_folder
 from cosim.cli.progress import Work
@@ -25,6 +24,7 @@ from cosim.errors import CosimError, MisfitError, UsageError
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
 from cosim.masters.error_controlled import TOLERANCE
+from cosim.masters.standing_signals import standing_still
 from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System

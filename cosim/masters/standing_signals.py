@@ -1,4 +1,4 @@
-"""What a run shows that would make the next one easier."""
+"""Signals that may change along flows and changed at events alone: what would make the next run easier."""
 
 from __future__ import annotations
 
