@@ -50,6 +50,7 @@ plot_apply_rcparams = True
 
 html_theme = "furo"
 html_title = "hybrid-fmu"
+html_show_copyright = False
 html_math_renderer = "drawings"
 html_show_sourcelink = False
 html_copy_source = False

@@ -50,7 +50,7 @@ def named_object(target: str, folder: str | os.PathLike[str] = "") -> object:
         form = f"{module}:ClassName" if module else "module:ClassName or file.py:ClassName"
         raise NamingError(f"{target} names no {'class' if module else 'module'}: write {form}.")
     if module.endswith(_SOURCE):
-        module = os.path.join(folder, module)
+        module = os.path.normpath(os.path.join(folder, module))
     try:
         return getattr(_imported(module), name)
     except FileNotFoundError as error:

@@ -191,7 +191,7 @@ class Entries:
             raise self.error(key, value, "must be a number")
         # Not a number compares with nothing; whole numbers may be too large for a float.
         if not abs(value) <= _LARGEST:
-            raise self.error(key, value, "must be a finite number")
+            raise self.error(key, value, f"must be a finite number, at most {_LARGEST:g} in size")
         return float(value)
 
     def _as_whole_number(self, key: str, value: object) -> int:

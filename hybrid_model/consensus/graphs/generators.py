@@ -293,7 +293,7 @@ def graph_of_kind(
         raise ValueError(f"there is no graph '{kind}'; it must be one of {', '.join(names)}.")
     wanted = GraphKind(kind)
     if wanted.is_random and not 0 < degree < agents:
-        raise ValueError(f"degree is {degree}; it must lie between 0 and the number of agents, {agents}.")
+        raise ValueError(f"degree is {degree:g}; it must be above 0 and below the number of agents, {agents}.")
     if wanted in (GraphKind.REGULAR, GraphKind.SMALL_WORLD) and degree != int(degree):
         raise ValueError(f"degree is {degree}; in a {wanted.value} graph it must be whole.")
     others = max(agents - 1, 1)

@@ -148,7 +148,7 @@ class FunctionWeight(Waveform):
 
     def __post_init__(self) -> None:
         """Try the function out."""
-        if not callable(self.function):
+        if not callable(self.function) or isinstance(self.function, type):
             raise ScenarioError(f"the weight is {self.function!r}, no function: write lambda t: ..., in numpy style.")
         if self.period is not None:
             require("period", self.period, self.period > 0, "must be positive")

@@ -105,7 +105,7 @@ def test_mean_degrees_are_about_what_was_asked_for():
     ("arguments", "message"),
     [
         (("torus", 9), "no graph 'torus'; it must be one of path, ring"),
-        (("regular", 9, 12), "degree is 12; it must lie between 0 and the number of agents, 9"),
+        (("regular", 9, 12), "degree is 12; it must be above 0 and below the number of agents, 9"),
         (("small-world", 9, 2.5), "in a small-world graph it must be whole"),
     ],
 )
