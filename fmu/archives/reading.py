@@ -171,33 +171,6 @@ class Archive:
             ) from error
 
 
-def extract_fmu(path: str | Path, folder: str | Path, limits: ArchiveLimits = LIMITS) -> Path:
-    """Extract an FMU into an existing folder; an unsafe archive is refused before anything is written.
-
-    Parameters
-    ----------
-    path : str or Path
-        The FMU.
-    folder : str or Path
-        Existing folder, best an empty one: no file is overwritten.
-    limits : ArchiveLimits
-
-    Returns
-    -------
-    Path
-        The folder.
-
-    Raises
-    ------
-    ArchiveError
-        If the archive is unsafe or damaged.
-    OSError
-        If a file cannot be read or written.
-    """
-    with Archive(path, limits) as archive:
-        return archive.extract(Path(folder))
-
-
 def _opened(file: IO[bytes]) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(file)

@@ -11,11 +11,16 @@ import pytest
 from small_fmus import DESCRIPTIONS
 
 from fmu.archives.checks import ArchiveLimits
-from fmu.archives.reading import Archive, ArchiveError, extract_fmu
+from fmu.archives.reading import Archive, ArchiveError
 from fmu.validate.check import check_fmu
 from fmu.validate.findings import Severity
 
 DESCRIPTION = ("modelDescription.xml", DESCRIPTIONS[3].encode())
+
+
+def extract(path, folder):
+    with Archive(path) as archive:
+        return archive.extract(folder)
 
 
 def pack(path, *entries, method=zipfile.ZIP_DEFLATED):
@@ -85,7 +90,7 @@ def test_names_that_leave_or_break_folders(name, rule, tmp_path):
     target = tmp_path / "target"
     target.mkdir()
     with pytest.raises(ArchiveError):
-        extract_fmu(path, target)
+        extract(path, target)
     assert list(target.iterdir()) == []
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.fmu", "target"]
 
@@ -122,7 +127,7 @@ def test_backslashes_are_said_and_read_as_folders(tmp_path):
     path = pack(tmp_path / "a.fmu", DESCRIPTION, ("resources\\data.txt", b"data"), ("resources\\empty\\", b""))
     target = tmp_path / "target"
     target.mkdir()
-    extract_fmu(path, target)
+    extract(path, target)
     assert (target / "resources" / "data.txt").read_bytes() == b"data"
     assert (target / "resources" / "empty").is_dir()
     [finding] = [f for f in check_fmu(path, run=False).findings if f.group == "archive"]
@@ -136,7 +141,7 @@ def test_equal_entries_that_are_there_twice_are_a_warning(tmp_path):
     path = pack(tmp_path / "a.fmu", DESCRIPTION, *twice)
     target = tmp_path / "target"
     target.mkdir()
-    extract_fmu(path, target)
+    extract(path, target)
     assert (target / "resources" / "data.txt").read_bytes() == b"data"
     [finding] = [f for f in check_fmu(path, run=False).findings if f.group == "archive"]
     assert (finding.rule, finding.severity) == ("archive.duplicate", Severity.WARNING)
@@ -146,7 +151,7 @@ def test_equal_entries_that_are_there_twice_are_a_warning(tmp_path):
 def test_empty_folders_are_extracted(tmp_path):
     target = tmp_path / "target"
     target.mkdir()
-    extract_fmu(pack(tmp_path / "a.fmu", DESCRIPTION, ("resources/", b"")), target)
+    extract(pack(tmp_path / "a.fmu", DESCRIPTION, ("resources/", b"")), target)
     assert (target / "resources").is_dir()
 
 
@@ -182,7 +187,7 @@ def test_an_announced_size_that_is_too_small_is_not_exceeded(tmp_path):
     target = tmp_path / "target"
     target.mkdir()
     with pytest.raises(ArchiveError, match="damaged"):
-        extract_fmu(path, target)
+        extract(path, target)
     assert sum(file.stat().st_size for file in target.rglob("*") if file.is_file()) < 1 << 20
 
 
@@ -207,7 +212,7 @@ def test_nested_archives_stay_closed(tmp_path):
     path = pack(tmp_path / "a.fmu", DESCRIPTION, ("resources/inner.zip", inner.getvalue()))
     target = tmp_path / "target"
     target.mkdir()
-    extract_fmu(path, target)
+    extract(path, target)
     assert (target / "resources" / "inner.zip").read_bytes() == inner.getvalue()
     assert "archive.nested" in {finding.rule for finding in check_fmu(path, run=False).findings}
 
@@ -227,10 +232,10 @@ def test_extraction_gives_the_bytes_and_overwrites_nothing(tmp_path):
     path = pack(tmp_path / "a.fmu", DESCRIPTION, ("resources/deep/data.bin", bytes(range(256)) * 9000))
     target = tmp_path / "target"
     target.mkdir()
-    assert extract_fmu(path, target) == target
+    assert extract(path, target) == target
     assert (target / "resources/deep/data.bin").read_bytes() == bytes(range(256)) * 9000
     with pytest.raises(FileExistsError):
-        extract_fmu(path, target)
+        extract(path, target)
 
 
 def test_many_long_names_are_judged_fast(tmp_path):

@@ -24,7 +24,6 @@ __all__ = [
     "directed_contraction",
     "directed_laplacian",
     "is_weight_balanced",
-    "random_balanced_digraph",
     "symmetric_part",
 ]
 
@@ -76,20 +75,6 @@ def symmetric_part(adjacency: ArrayLike) -> NDArray[np.float64]:
         )
     U = disagreement_basis(len(L))
     return np.asarray(U.T @ (L + L.T) @ U / 2)
-
-
-def random_balanced_digraph(agents: int, cycles: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Random balanced weights, shape (n, n): a sum of directed cycles, each with a weight between 0.1 and 1.
-
-    Balanced graphs are the sums of weighted cycles. The first cycle passes all agents and makes the graph strongly
-    connected; the others pass at least two. Without cycles all weights are zero.
-    """
-    A = np.zeros((agents, agents))
-    for number in range(cycles):
-        length = agents if number == 0 else int(rng.integers(2, agents + 1))
-        around = rng.permutation(agents)[:length]
-        A[around, np.roll(around, -1)] += rng.uniform(0.1, 1.0)
-    return A
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,6 @@ __all__ = [
     "Edge",
     "complete_edges",
     "disagreement_basis",
-    "edge_laplacian",
     "incidence",
     "laplacian",
     "validate_edges",
@@ -95,12 +94,6 @@ def weighted_laplacian(agents: int, edges: Sequence[Edge], weights: ArrayLike) -
         raise ValueError(f"weights has the shape {values.shape}; it must be ({len(edges)},), one number per edge.")
     D = incidence(agents, edges)
     return np.asarray((D * values) @ D.T)
-
-
-def edge_laplacian(agents: int, edges: Sequence[Edge]) -> NDArray[np.float64]:
-    """Edge Laplacian ``L_e = D^T D``, shape (edges, edges); paper, section 3."""
-    D = incidence(agents, edges)
-    return D.T @ D
 
 
 def disagreement_basis(agents: int) -> NDArray[np.float64]:

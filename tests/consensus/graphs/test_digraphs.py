@@ -8,13 +8,22 @@ from hybrid_model.consensus.graphs.digraphs import (
     directed_contraction,
     directed_laplacian,
     is_weight_balanced,
-    random_balanced_digraph,
     symmetric_part,
 )
 from hybrid_model.consensus.graphs.generators import erdos_renyi_graph
 from hybrid_model.consensus.graphs.undirected import disagreement_basis, weighted_laplacian
 
 ROUNDING = 1e-9  # relative, of products of a few matrix exponentials
+
+
+def random_balanced_digraph(agents, cycles, rng):
+    """A sum of weighted cycles, as all balanced graphs are: the first passes all agents; without cycles it is empty."""
+    A = np.zeros((agents, agents))
+    for number in range(cycles):
+        length = agents if number == 0 else int(rng.integers(2, agents + 1))
+        around = rng.permutation(agents)[:length]
+        A[around, np.roll(around, -1)] += rng.uniform(0.1, 1.0)
+    return A
 
 
 def random_switching(seed):
