@@ -78,13 +78,13 @@ def test_a_fault_is_named_and_without_its_guard_it_is_not(behaviour, sentence, p
         assert sentence not in str(error)  # noqa: PT017 - any other end shows that the guard is gone
 
 
-def without(guard, module, monkeypatch):
-    """Make a module anew whose condition never holds."""
+def without(guard, module, monkeypatch, instead=None):
+    """Make a module anew whose condition never holds, or which has something else in its place."""
     source = inspect.getsource(module)
     assert source.count(guard) == 1
     made = types.ModuleType(f"{module.__name__}_without")
     monkeypatch.setitem(sys.modules, made.__name__, made)
-    exec(compile(source.replace(guard, f"False and {guard}"), module.__file__, "exec"), made.__dict__)
+    exec(compile(source.replace(guard, instead or f"False and {guard}"), module.__file__, "exec"), made.__dict__)
     return made
 
 
