@@ -38,7 +38,7 @@ def read_description(path: str | Path, *, validate: bool = True) -> Any:
     PlainXmlError
         If its description has a DOCTYPE, or is not in UTF-8.
     LoadError
-        If it is of FMI 1.0, which fmpy reads as far as it fits.
+        If it is of another version, such as 1.0, which fmpy reads as far as it fits.
     Exception
         Whatever fmpy raises for a description that it cannot read.
     """
@@ -46,18 +46,18 @@ def read_description(path: str | Path, *, validate: bool = True) -> Any:
         if DESCRIPTION in archive.names:
             text = archive.read(DESCRIPTION)
             require_plain(text, DESCRIPTION)
-            if version := _older(text):
+            if version := _other_version(text):
                 raise LoadError(f"It is of FMI {version}, and FMI 2.0 and 3.0 are run here: export it as one of them.")
         return read_model_description(str(path), validate=validate)
 
 
-def _older(description: bytes) -> str:
-    """The version of a description of FMI 1; nothing for any other, or if it is no XML."""
+def _other_version(description: bytes) -> str:
+    """The version of a description of neither FMI 2 nor 3; nothing for these, without a version, or if it is no XML."""
     try:
         version = str(etree.fromstring(description).get("fmiVersion", ""))
     except etree.XMLSyntaxError:
         return ""
-    return version if version.startswith("1.") else ""
+    return version if version.partition(".")[0] not in ("", "2", "3") else ""
 
 
 def major_of(description: Any) -> int | None:
@@ -99,7 +99,7 @@ def _require_binary(folder: Path, fmi3: bool, identifier: str) -> None:
         others = sorted(place.name for place in places.iterdir()) if places.is_dir() else []
         raise LoadError(
             f"there is no binaries/{wanted}/{identifier}{sharedLibraryExtension} in it; it has binaries for "
-            f"{', '.join(others) or 'no platform'}"
+            f"{', '.join(others) or 'no platform'}. Export or build it for this one."
         )
 
 

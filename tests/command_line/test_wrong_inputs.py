@@ -60,6 +60,7 @@ ZIPS = {
     "noxml.fmu": ("a.txt", "x"),
     "badxml.fmu": ("modelDescription.xml", "<fmiModelDescription"),
     "fmi1.fmu": ("modelDescription.xml", FMI1),
+    "fmi4.fmu": ("modelDescription.xml", FMI1.replace('"1.0"', '"4.0"')),
     "nossd.ssp": ("a.txt", "x"),
 }
 
