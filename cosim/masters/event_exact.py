@@ -112,6 +112,8 @@ def _run(
         if output_interval is not None:
             sample_end(system, result, t_start, system.output_names)
         _advance(scheduler, system, result, t_stop, output_interval, changes, at_events)
+        if isinstance(scheduler, Scheduler):
+            scheduler.bring_to_the_end()
         if scheduler.ended and output_interval is not None:
             sample_end(system, result, scheduler.ended[1], system.output_names)
         result.final = outputs(system)

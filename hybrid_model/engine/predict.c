@@ -48,7 +48,8 @@ static bool foresee(Engine *engine, double limit, size_t budget, double *event_t
     engine->status->prediction = end == FLOW_EVENT ? PREDICTION_EVENT : renew ? PREDICTION_RENEWAL : PREDICTION_QUIET;
     /* Without an event ahead the limit is announced, where nothing happens: that too is knowledge. */
     *event_time = *engine->predicted.time;
-    return *event_time > now;
+    /* A run that ends within an instant has no time to announce: rounding by rounding it would not get to its end. */
+    return *event_time > now + (end == FLOW_PROBLEM ? engine_one_instant(engine, *event_time) : 0.0);
 }
 
 /* Looks ahead over so many steps; with `keep` the live point then moves along the first of them. */

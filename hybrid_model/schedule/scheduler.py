@@ -177,6 +177,17 @@ class Scheduler:
         if not self.ended:
             self.t = limit
 
+    def bring_to_the_end(self) -> None:
+        """Bring all blocks to where one of them has ended the run, if it has: what is read then is of one time."""
+        if not self.ended:
+            return
+        ended = self.ended
+        for place in self._in_order:
+            # One that stops before has an event of that instant, which nobody handles any more.
+            if place.t < ended[1] and place.block.name != ended[0]:
+                self._step(place, ended[1])
+        self.ended = ended
+
     def handle_events(self, t: float, due: Collection[str]) -> None:
         """Iterate the events of one instant: jumps in the order of the blocks, signals travelling at once (rule 6).
 
@@ -369,7 +380,8 @@ class Scheduler:
                     stopped.append(place)
                     first = min(first, place.t)
                 if self.ended:
-                    return []
+                    first = min(first, place.t)
+                    break
             for place, t, state in saved:
                 if place.t > first + self._instant(place, first):
                     place.block.restore(state)
@@ -380,6 +392,8 @@ class Scheduler:
         finally:
             for place, _, state in saved:
                 place.block.release(state)
+        if self.ended:
+            return []
         for place in stopped:
             if place.t > first + self._instant(place, first) and not place.block.can_restore:
                 heapq.heappush(self._queue, (place.t, place.order, place.version))

@@ -276,6 +276,60 @@ def test_a_block_that_cannot_begin_ends_the_run_with_its_own_words(kind, exporte
     assert result.t == 0.0
 
 
+class Bounded(hm.HybridAutomaton):
+    """May flow up to a length, where it has no jump to take; it counts on the way."""
+
+    x = hm.State(0.0, output=True)
+    count = hm.DiscreteState(0, integer=True, output=True)
+    length = hm.Parameter(2.3)
+
+    def flow_map(self, s):
+        return {"x": 1.0}
+
+    def flow_set(self, s):
+        return s.length - s.x
+
+    transitions = (
+        hm.TimeEvent("tick", lambda self, s: 0.5 * (s.count + 1), lambda self, s: {"count": s.count + 1}),
+    )
+
+
+# At 2.5 s a known time and the end of the flow are one instant.
+@pytest.mark.parametrize("length", [2.3, 2.5])
+@pytest.mark.parametrize("kind", [AutomatonSlave, FmuSlave])
+def test_a_block_whose_flow_ends_on_the_way_ends_the_run_there_at_once(length, kind, exported):
+    short, longer = Bounded(length=length), Bounded(length=100.0)
+    blocks = {"short": short, "long": longer}
+    if kind is FmuSlave:
+        blocks = {name: exported(block, name) for name, block in blocks.items()}
+    result = run_event_exact(System([kind(name, block) for name, block in blocks.items()], {}), 5.0, output_interval=1)
+    assert result.ended is Ended.TERMINATED
+    assert "short" in result.message
+    # The border of the flow set is 1e-9 of the size of a state wide.
+    assert result.t == pytest.approx(length, abs=1e-8)
+    assert result.steps < 100
+    # The last row is of one time for all.
+    assert result.signals["long.x"][-1] == pytest.approx(result.t, abs=1e-12)
+    assert result.final["long.x"] == result.signals["long.x"][-1]
+
+
+class Pushed(Bounded):
+    """The same with an input that follows time, so that it cannot tell its next event."""
+
+    push = hm.Input(0.0)
+
+
+@pytest.mark.parametrize("order", ["short long", "long short"])
+def test_blocks_that_went_ahead_return_to_where_another_one_ends_the_run(order):
+    lengths = {"short": 2.3, "long": 100.0}
+    slaves = [AutomatonSlave(name, Pushed(length=lengths[name]), engine="python") for name in order.split()]
+    result = run_event_exact(System(slaves, {}), 5.0, output_interval=1)
+    assert result.ended is Ended.TERMINATED
+    assert result.t == pytest.approx(2.3, abs=1e-8)
+    assert result.final["long.x"] == pytest.approx(result.t, abs=1e-12)
+    assert result.final["long.count"] == 4
+
+
 @pytest.mark.parametrize(("t_stop", "points"), [(11.9, 41), (12.0, 41), (0.7, 8)])
 def test_output_points_end_at_the_stop_time_whatever_rounding_says(t_stop, points):
     # 40 * (11.9/40) is an ulp below 11.9.
