@@ -135,7 +135,8 @@ class _Parser(argparse.ArgumentParser):
         taken = [str(action.metavar) for action in self._actions if not action.option_strings]
         if not taken:
             return f"'{self.prog}' takes no argument but options, and '{word}' is one: leave it out."
-        return f"'{self.prog}' takes one {' and one '.join(taken)}, and '{word}' is one more: call it once for each."
+        remedy = "put them into a folder, or into a system's .toml" if "SYSTEM" in taken else "call it once for each"
+        return f"'{self.prog}' takes one {' and one '.join(taken)}, and '{word}' is one more: {remedy}."
 
     def error(self, message: str) -> NoReturn:
         """Refuse what was typed."""
