@@ -217,7 +217,9 @@ static bool count_jump(Engine *engine, size_t jump)
 static bool take_jump(Engine *engine, size_t jump)
 {
     engine_changed(engine);
-    if (!engine_apply_reset(engine, jump, &engine->live) || !engine_take_internal_jumps(engine, &engine->live))
+    bool going = engine_apply_reset(engine, jump, &engine->live) && engine_take_internal_jumps(engine, &engine->live);
+    /* The last jump of a budget has happened. */
+    if (!going && engine->problem != ENDED_JUMPS)
         return engine_end_run(engine);
     if (engine->model->jumps[jump].kind == JUMP_ON_STATE)
         engine->live.level[engine->model->jumps[jump].index] = 0.0;
@@ -225,7 +227,7 @@ static bool take_jump(Engine *engine, size_t jump)
     engine->ticked[jump] = 1;
     if (engine->jump_hook)
         engine->jump_hook(engine->jump_context, *engine->live.time, jump);
-    return count_jump(engine, jump) || engine_end_run(engine);
+    return (going && count_jump(engine, jump)) || engine_end_run(engine);
 }
 
 bool engine_start(Engine *engine)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
@@ -142,6 +143,8 @@ class RebuiltArcs(Mapping[str, HybridArc]):
         automaton, inputs = self._declared(part)
         run = NativeRun(table.groups[table.group_of[part]].model)
         fill_options(run.options, self._solver, self._zeno, layout_of(automaton).sizes[Kind.STATE])
+        # What has happened is within the bounds of the run.
+        run.options.most_jumps = math.inf
         starts = [self._started.read_part(part, kind) for kind in ROWS]
         happened = self._events.of_part(table, part)
         end = self._span[1]

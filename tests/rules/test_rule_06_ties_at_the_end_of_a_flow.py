@@ -106,3 +106,32 @@ class TwoGuards(hm.HybridAutomaton):
 def test_a_jump_that_lowers_the_margin_takes_the_other_guard_back():
     arc = hm.simulate(TwoGuards(), 2.9)
     assert [jump.name for jump in arc.jumps] == ["first"]
+
+
+class Twice(hm.HybridAutomaton):
+    """Counts the same instants by a clock and by a ramp, whose levels are met where steps end at the clock's times."""
+
+    rate = hm.Parameter(3.0)
+    x = hm.State(0.0)
+    ticks = hm.DiscreteState(0.0)
+    levels = hm.DiscreteState(0.0)
+
+    def flow_map(self, s):
+        return {"x": s.rate}
+
+    transitions = (
+        hm.TimeEvent("tick", lambda self, s: 0.1 * (s.ticks + 1.0), lambda self, s: {"ticks": s.ticks + 1.0}),
+        hm.Jump(
+            "level", lambda self, s: s.x - 0.1 * s.rate * (s.levels + 1.0), lambda self, s: {"levels": s.levels + 1.0}
+        ),
+    )
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+@pytest.mark.parametrize("rate", [3.0, 0.7, 0.9, 1.1, 2.3])
+def test_a_level_that_is_met_at_the_very_end_of_a_step_is_met_with_the_time_event(rate, engine):
+    """Rounding must not put the state at the event, computed anew, below the level."""
+    arc = hm.simulate(Twice(rate=rate), 3.05, engine=engine)
+    together = [(one.t, one.name, other.name) for one, other in zip(arc.jumps[::2], arc.jumps[1::2], strict=True)]
+    assert [names for _, *names in together] == [["tick", "level"]] * 30
+    assert all(one.t == other.t for one, other in zip(arc.jumps[::2], arc.jumps[1::2], strict=True))

@@ -130,6 +130,7 @@ def test_the_jumps_of_each_part_are_bounded(engine):
     run = hm.simulate_network(network, 9.0, zeno=hm.ZenoGuard(max_jumps=20), engine=engine)
     assert run.stop is hm.Stop.JUMPS
     assert "part fast" in run.message
+    assert len(run.arcs["fast"].jumps) == len(run.event_times("fast", "tick")) == run.events.counts(2)[1] == 20
     assert run.t == pytest.approx(2.0)
     assert len(run.arcs["slow"].jumps) in (1, 2)
 

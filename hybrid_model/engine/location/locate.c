@@ -65,8 +65,12 @@ static FlowEnd move_to(Search *search, double t)
 {
     Engine *engine = search->engine;
     const Point *point = search->point;
-    if (!engine_step_probe(engine, point, t) ||
-        (point == &engine->live && !engine_record_step(engine, t, engine->probe_x)))
+    /* Where the step ends, its guards were looked at with its own end. */
+    if (t == engine->step.t1)
+        engine_copy(engine->probe_x, engine->step.x1, engine->model->n_states);
+    else if (!engine_step_probe(engine, point, t))
+        return FLOW_PROBLEM;
+    if (point == &engine->live && !engine_record_step(engine, t, engine->probe_x))
         return FLOW_PROBLEM;
     double interval = t - engine->status->jumps_time, before = engine->status->stride;
     *point->time = t;

@@ -121,16 +121,15 @@ static bool jump(Schedule *schedule, uint32_t i, double t, bool *again)
     schedule->last_jump = NO_JUMP;
     bool going = engine_jump(engine, &schedule->states_changed);
     uint32_t taken = schedule->last_jump;
-    if (!going) {
+    *again = going && taken != NO_JUMP && engine_pending(engine) < engine->model->n_jumps;
+    if (!going || engine->status->ending != ENDED_NOT) {
+        /* The jump that the run has ended with has happened. */
         if (taken != NO_JUMP && schedule_signals(schedule, i, schedule->values) &&
             !keep(schedule, i, engine_time(engine), taken, schedule->values,
                   schedule->groups[schedule->parts[i].group].n_signals))
             return false;
         return schedule_over(schedule, i);
     }
-    *again = taken != NO_JUMP && engine_pending(engine) < engine->model->n_jumps;
-    if (engine->status->ending != ENDED_NOT)
-        return schedule_over(schedule, i);
     return show(schedule, i, t, taken);
 }
 
