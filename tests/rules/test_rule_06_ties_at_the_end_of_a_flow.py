@@ -135,3 +135,38 @@ def test_a_level_that_is_met_at_the_very_end_of_a_step_is_met_with_the_time_even
     together = [(one.t, one.name, other.name) for one, other in zip(arc.jumps[::2], arc.jumps[1::2], strict=True)]
     assert [names for _, *names in together] == [["tick", "level"]] * 30
     assert all(one.t == other.t for one, other in zip(arc.jumps[::2], arc.jumps[1::2], strict=True))
+
+
+class Stairs(hm.HybridAutomaton):
+    """Counts the levels that a ramp comes to."""
+
+    rate = hm.Parameter(1.0)
+    x = hm.State(0.0)
+    count = hm.DiscreteState(0.0)
+
+    def flow_map(self, s):
+        return {"x": s.rate}
+
+    transitions = (
+        hm.Jump("tick", lambda self, s: s.x - 0.1 * s.rate * (s.count + 1.0), lambda self, s: {"count": s.count + 1.0}),
+    )
+
+
+class Relaxing(hm.HybridAutomaton):
+    """Rises ever slower to one, and falls back: its events cut the steps of what runs with it."""
+
+    x = hm.State(0.3)
+
+    def flow_map(self, s):
+        return {"x": 1.0 - 0.3 * s.x}
+
+    transitions = (hm.Jump("fall", lambda self, s: s.x - 1.0, lambda self, s: {"x": 0.1}),)
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+@pytest.mark.parametrize("rates", [(3.4, 1.93), (2.42, 0.6), (1.65, 3.26), (2.74, 3.48)])
+def test_levels_at_the_end_of_a_run_are_met_together_in_the_order_of_the_parts(rates, engine):
+    """One of the two is met at the end or some rounding before it, the other some rounding behind it."""
+    parts = {"a": Stairs(rate=rates[0]), "b": Stairs(rate=rates[1]), "c": Relaxing()}
+    arc = hm.simulate(hm.Composition("stairs", parts, {}), 3.0, engine=engine)
+    assert [jump.name for jump in arc.jumps if jump.t > 2.95 and "tick" in jump.name] == ["a.tick", "b.tick"]

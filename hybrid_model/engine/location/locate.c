@@ -22,14 +22,19 @@ static Search search_at(Engine *engine, const Point *point, double level, double
     return (Search){engine, point, level, piece_end, .n_rows = n + 1, .exit_row = n};
 }
 
+/* No flow is looked at beyond it. */
+static double last_time(const Search *search)
+{
+    return fmin(search->piece_end, search->engine->status->stop_time);
+}
+
 /* The time within one instant after `from` at which guards that are negative there cross, the
    first or the last of them.  `from` itself if there is none. */
 static double crossing_soon_after(Search *search, double from, bool want_first)
 {
     Engine *engine = search->engine;
     const Model *m = engine->model;
-    double end = fmin(search->piece_end, engine->status->stop_time);
-    double until = fmin(from + engine_one_instant(engine, from), end), chosen = from;
+    double until = fmin(from + engine_one_instant(engine, from), last_time(search)), chosen = from;
     double *now = engine->samples, *then = engine->samples + search->n_rows;
     if (until <= from || !engine_look(search, ON_STEP, from, now) || !engine_try_to_look(search, ON_STEP, until, then))
         return from;
@@ -309,7 +314,7 @@ static FlowEnd locate_in_window(Search *search, bool may_narrow)
         return FLOW_SHORTER;
     if (has_guard && (!leaves || guard <= leaving + engine_one_instant(engine, leaving))) {
         guard = common_time(search, guard); /* line 18 */
-        if (search->failed || (guard + engine_one_instant(engine, guard) > search->piece_end &&
+        if (search->failed || (guard + engine_one_instant(engine, guard) > last_time(search) &&
                                !engine_raise_levels(engine, search->point, guard)))
             return FLOW_PROBLEM;
         return move_to(search, guard);
