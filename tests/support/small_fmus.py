@@ -113,7 +113,7 @@ def binary(major, *flags):
     options = [flag if flag.startswith("-") else f"-DFAULT_{flag}" for flag in flags]
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder) / f"small{EXTENSION}"
-        base = ["cc", "-O1", "-w", "-shared", "-fPIC", "-fvisibility=hidden", f"-DFMI={major}", "-fno-builtin"]
+        base = ["cc", "-O0", "-w", "-shared", "-fPIC", "-fvisibility=hidden", f"-DFMI={major}", "-fno-builtin"]
         subprocess.run([*base, *options, SOURCE, stubs(folder, major), "-o", output, "-lm"], check=True)
         return output.read_bytes()
 
