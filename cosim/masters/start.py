@@ -16,6 +16,8 @@ from hybrid_model.declare.real_numbers import is_real
 
 MOST_STEPS = 100_000_000
 """Most steps of one run."""
+GROWTH = 1.5
+"""By so much what the process holds may grow from run to run before it is looked through for garbage."""
 
 
 def require_times(t_start: float, t_stop: float, interval: float | None, what: str) -> None:
@@ -108,12 +110,20 @@ def outputs(system: System) -> dict[str, float]:
     return {name: system.get(name) for name in system.output_names}
 
 
+class _Rest:
+    """What the process holds besides a run."""
+
+    looked_at = 0
+    """How many objects there were after all of them had been looked at last, or at the first run."""
+
+
 @contextlib.contextmanager
 def apart_from_the_rest() -> Iterator[None]:
     """Spare what is there already from the collections of garbage that a run brings about.
 
     A full collection looks through all that the process holds, the descriptions of all FMUs among it, so an event
-    would cost the more the larger its system. What the run makes itself is collected as always.
+    would cost the more the larger its system. What the run makes itself is collected as always. What is thawed counts
+    as old, which alone never brings about a full collection, so one follows the runs that have left much.
     """
     if gc.get_freeze_count():  # of somebody else, who is to thaw it
         yield
@@ -122,4 +132,9 @@ def apart_from_the_rest() -> Iterator[None]:
     try:
         yield
     finally:
+        held = gc.get_freeze_count()
         gc.unfreeze()
+        _Rest.looked_at = _Rest.looked_at or held
+        if held > GROWTH * _Rest.looked_at and gc.isenabled():
+            gc.collect()
+            _Rest.looked_at = 0
