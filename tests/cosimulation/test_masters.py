@@ -291,9 +291,7 @@ class Bounded(hm.HybridAutomaton):
     def flow_set(self, s):
         return s.length - s.x
 
-    transitions = (
-        hm.TimeEvent("tick", lambda self, s: 0.5 * (s.count + 1), lambda self, s: {"count": s.count + 1}),
-    )
+    transitions = (hm.TimeEvent("tick", lambda self, s: 0.5 * (s.count + 1), lambda self, s: {"count": s.count + 1}),)
 
 
 # At 2.5 s a known time and the end of the flow are one instant.

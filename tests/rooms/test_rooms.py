@@ -1,6 +1,7 @@
 """The house: rooms that are not crowded and say what they are for; contracts that notice an arrow turned round."""
 
 import ast
+import fnmatch
 import re
 import shutil
 import subprocess
@@ -81,3 +82,11 @@ def test_an_arrow_turned_round_breaks_its_contract(tmp_path):
     assert done.returncode == 1
     for contract in layered:
         assert re.search(rf"^{re.escape(contract['name'])}.*BROKEN", done.stdout, re.MULTILINE), done.stdout
+
+
+def test_pytest_goes_into_every_folder_of_tests():
+    """By default it passes over folders called build, dist or venv without a word."""
+    left_out = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["pytest"]["ini_options"]
+    folders = {part for file in (ROOT / "tests").rglob("test_*.py") for part in file.relative_to(ROOT).parts[:-1]}
+    assert {"build", "rooms"} <= folders
+    assert [name for name in folders for pattern in left_out["norecursedirs"] if fnmatch.fnmatch(name, pattern)] == []
