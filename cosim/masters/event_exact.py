@@ -158,7 +158,7 @@ def _change_on_the_way(
 ) -> None:
     """Set what changes up to `limit` in s, each time as an event of the slaves concerned."""
     while not scheduler.ended and (due := changes.next_time(limit)) is not None:
-        scheduler.advance_to(due)
+        scheduler.approach(due)
         if scheduler.ended:
             return
         if watch:

@@ -14,6 +14,7 @@ from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import SchedulingError, SimulationError
 from hybrid_model.native.network_run import NativeNetwork, NetworkAdvance, PartGroup
 from hybrid_model.native.run import Ending
+from hybrid_model.scales import one_instant
 from hybrid_model.schedule.blocks import StiffPart, Termination
 from hybrid_model.schedule.native_block import OF_THE_RUN, NativeBlock
 from hybrid_model.schedule.native_network import EVENTS_AT_ONCE, STEPS_AHEAD
@@ -52,6 +53,7 @@ class JoinedBlocks:
         self.ticks: list[Tick] = []
         self.events: list[Event] = []
         self.ended: tuple[str, float, Termination] | None = None
+        self._t_start = span[0]
         self._names, self._blocks, self._watch = list(blocks), list(blocks.values()), watch
         self._numbers = {name: part for part, name in enumerate(blocks)}
         self._network = _network(self._blocks, self._names, wires_from)
@@ -100,6 +102,26 @@ class JoinedBlocks:
             advance = NetworkAdvance.GOING
             while advance is NetworkAdvance.GOING:
                 advance = self._network.advance(limit, EVENTS_AT_ONCE)
+                self._take()
+        self._note(advance)
+
+    def approach(self, limit: float) -> None:
+        """Handle all events before `limit` in s; those there come with `handle_events`. See `Scheduler.approach`."""
+        advance = NetworkAdvance.GOING
+        while self._watch and advance is NetworkAdvance.GOING:
+            advance = self._network.next_instant(limit)
+            if advance is NetworkAdvance.GOING:
+                if limit - self.t <= one_instant(limit, self._t_start, self._t_start):
+                    return
+                self._watch(self.t)
+                if not self._network.handle():
+                    advance = self._network.end.how
+                self._take()
+                self._watch(self.t)
+        if advance in (NetworkAdvance.GOING, NetworkAdvance.REACHED):
+            advance = NetworkAdvance.GOING
+            while advance is NetworkAdvance.GOING:
+                advance = self._network.approach(limit, EVENTS_AT_ONCE)
                 self._take()
         self._note(advance)
 

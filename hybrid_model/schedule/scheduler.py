@@ -148,6 +148,7 @@ class Scheduler:
         # Blocks go by their order from here on: numbers sort themselves.
         self._unpredictable: set[int] = set()
         self._idle: set[int] = set()
+        self._left: set[int] = set()
         self._queue: list[tuple[float, int, int]] = []
 
     @property
@@ -177,6 +178,26 @@ class Scheduler:
         if not self.ended:
             self.t = limit
 
+    def approach(self, limit: float) -> None:
+        """Handle all events before `limit` in s, and bring every block there; those that have events there keep them.
+
+        They come with `handle_events`, after what changes from outside at that time (rule 5).
+        """
+        while not self.ended:
+            t, due = self._next_instant(limit)
+            if not due:
+                break
+            if limit - t <= min(self._instant(self._in_order[order], t) for order in due):
+                self._left = due
+                break
+            self._happen(t, due)
+        for place in self._in_order:
+            if not self.ended and place.t < limit and place.order not in self._left and self._step(place, limit).event:
+                self._require_announced(place, limit)
+                self._left.add(place.order)
+        if not self.ended:
+            self.t = limit
+
     def bring_to_the_end(self) -> None:
         """Bring all blocks to where one of them has ended the run, if it has: what is read then is of one time."""
         if not self.ended:
@@ -196,9 +217,16 @@ class Scheduler:
         t : float
             The instant, in s.
         due : collection of str
-            Blocks that are there, in event mode.
+            Blocks that are there, in event mode; those that `approach` has left with events are added.
         """
-        self._iterate(t, {self._places[name].order for name in due})
+        given, left = {self._places[name].order for name in due}, sorted(self._left)
+        self._left = set()
+        for order in left:
+            if order not in given:
+                self._in_order[order].block.enter_event_mode()
+        self._idle.clear()
+        self._iterate(t, given.union(left))
+        self.events += [Event(t, self._in_order[order].block.name) for order in left if order not in self._idle]
 
     def _iterate(self, t: float, due: set[int]) -> None:
         pending, touched = set(due), set(due)

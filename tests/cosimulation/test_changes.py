@@ -149,3 +149,31 @@ def test_names_and_values_that_cannot_be(block):
             run_fixed_step(system, 1.0, 0.1, inputs={"block.limit": value})
     with pytest.raises(MisfitError, match="finite times"):
         run_fixed_step(system, 1.0, 0.1, inputs={"block.limit": hm.Signal(lambda t: 1.0, [float("inf")])})
+
+
+class Sampler(hm.HybridAutomaton):
+    """Samples its input every second."""
+
+    u = hm.Input(0.0, discrete=True)
+    count = hm.DiscreteState(0, integer=True)
+    held = hm.DiscreteState(0.0, output=True)
+
+    transitions = (
+        hm.TimeEvent("sample", lambda self, s: s.count + 1.0, lambda self, s: {"count": s.count + 1, "held": s.u}),
+    )
+
+
+@pytest.mark.parametrize("grid", [{}, {"output_interval": 0.25, "record_events": True}])
+@pytest.mark.parametrize("kind", ["native", "python", "fmu"])
+def test_an_input_that_steps_when_it_is_sampled_is_sampled_with_its_new_value(kind, grid, exported):
+    # As in a run of the automaton: a change comes before the jumps of its instant (rule 5).
+    step = hm.Signal(lambda t: 0.0 if t < 2.0 else 5.0, [2.0])
+    alone = hm.simulate(Sampler(), 2.5, inputs={"u": step})
+    assert alone.at("held", 2.25) == 5.0
+    if kind == "fmu":
+        slave = FmuSlave("sampler", exported(Sampler(), "sampler"))
+    else:
+        slave = AutomatonSlave("sampler", Sampler(), engine=kind)
+    result = run_event_exact(System([slave], {}), 2.5, inputs={"sampler.u": step}, **grid)
+    assert result.final["sampler.held"] == 5.0
+    assert [event.t for event in result.events] == [1.0, 2.0]
