@@ -136,9 +136,9 @@ bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long cou
             count, name, t);
     return engine_fail(engine, ENDED_ZENO,
                        "Zeno: %llu jumps of '%s' at one instant, t = %.9g s: after the jump the state is still in the "
-                       "jump set. Make the jump map leave the jump set, or let the margin be negative there (a "
-                       "threshold that is zero together with its error fires for ever; so does a set given as 0 "
-                       "outside and 1 inside, because zero is inside).",
+                       "jump set, or what other parts send at that instant brings it back. Make the jump map leave "
+                       "the jump set, or let the margin be negative there (a threshold that is zero together with its "
+                       "error fires for ever; so does a set given as 0 outside and 1 inside, because zero is inside).",
                        count, name, t);
 }
 

@@ -153,7 +153,7 @@ _STILL_DUE = (
     "its clock, declare the clock's state with computed=True and let start_map give the next time to come."
 )
 _STILL_ENABLED = (
-    "after the jump the state is still in the jump set. Make the jump map leave the jump set, or let the margin be "
-    "negative there (a threshold that is zero together with its error fires for ever; so does a set given as 0 outside "
-    "and 1 inside, because zero is inside)."
+    "after the jump the state is still in the jump set, or what other parts send at that instant brings it back. Make "
+    "the jump map leave the jump set, or let the margin be negative there (a threshold that is zero together with its "
+    "error fires for ever; so does a set given as 0 outside and 1 inside, because zero is inside)."
 )

@@ -147,7 +147,7 @@ class JoinedBlocks:
         block = self._blocks[part]
         value = self._network.peek(part, *block.place(variable))
         if value is None:
-            raise SimulationError(f"{block.automaton.name}: {self._network.problem(part)}")
+            raise SimulationError(f"{name}: {block.automaton.name}: {self._network.problem(part)}")
         return value
 
     def set(self, name: str, variable: str, value: float) -> None:
@@ -175,7 +175,7 @@ class JoinedBlocks:
         if end.how is NetworkAdvance.REFUSED:
             raise SchedulingError(f"{name} {end.message}")
         if end.ending not in OF_THE_RUN:
-            raise SimulationError(f"{automaton}: {end.message}")
+            raise SimulationError(f"{name}: {automaton}: {end.message}")
         self.ended = name, end.t, Termination(f"{automaton}: {end.message}", end.ending is Ending.ZENO)
 
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
-from hybrid_model.errors import SchedulingError
+from hybrid_model.errors import SchedulingError, SimulationError
 from hybrid_model.scales import one_instant
 from hybrid_model.schedule.blocks import Block, Step, Termination
 
@@ -240,7 +240,10 @@ class Scheduler:
                 raise SchedulingError(
                     f"{place.block.name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s."
                 )
-            again, ticks, place.next_event, terminated, idle = place.block.update()
+            try:
+                again, ticks, place.next_event, terminated, idle = place.block.update()
+            except SimulationError as error:
+                raise _of_block(place.block.name, error) from error
             if ticks:
                 self.ticks += [Tick(t, place.block.name, clock) for clock in ticks]
             if idle and iterations[order] == 1:
@@ -317,7 +320,10 @@ class Scheduler:
             )
 
     def _step(self, place: _Place, t: float) -> Step:
-        made = place.block.step(place.t, t)
+        try:
+            made = place.block.step(place.t, t)
+        except SimulationError as error:
+            raise _of_block(place.block.name, error) from error
         reached, _, terminated = made
         self.steps += 1
         if reached < place.t or (reached > t and reached > t + self._instant(place, t)):
@@ -426,3 +432,8 @@ class Scheduler:
             if place.t > first + self._instant(place, first) and not place.block.can_restore:
                 heapq.heappush(self._queue, (place.t, place.order, place.version))
         return [place for place in stopped if place.t <= first + self._instant(place, first)]
+
+
+def _of_block(name: str, error: SimulationError) -> SimulationError:
+    """Return what a block of many says in an error, with its name: many are of one class."""
+    return SimulationError(f"{name}: {error}")
