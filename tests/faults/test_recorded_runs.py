@@ -42,7 +42,7 @@ SOURCES = {file.name: file for folder in FOLDERS for file in sorted(folder.glob(
 FAULTS = {
     "a step that was cut is kept whole": ("recorder.c", "row[2] = end;", "row[2] = t1;"),
     "the start of a step is lost": ("recorder.c", "row[0] = engine->step.t0;", "row[0] = *engine->live.time + 1e-3;"),
-    "states at the end are those at the start": ("locate.c", "t, engine->probe_x)))", "t, point->x)))"),
+    "states at the end are those at the start": ("locate.c", "t, engine->probe_x))", "t, point->x))"),
     "the interpolation is another step's": (
         "recorder.c",
         "engine_copy(row + BEFORE_STATES + n, engine_step_vectors(engine), engine->method->n_vectors * n);",
