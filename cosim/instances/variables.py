@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -98,9 +99,13 @@ class FmuVariables:
         declared = variable.declaredType
         unit = variable.unit or (declared.unit if declared else None) or ""
         array = variable.name if variable.dimensions else ""
+        measure = self._measures.get(unit)
+        relative = variable.relativeQuantity or (declared is not None and declared.relativeQuantity)
+        if measure is not None and relative:  # a difference: 20 degC are 20 K
+            measure = replace(measure, offset=0.0)
         kind, whole = KINDS.get(variable.type, "number"), variable.type in INTEGERS
         for name in self._names(variable):
-            yield Port(name, unit, discrete, kind, whole, array, self._measures.get(unit))
+            yield Port(name, unit, discrete, kind, whole, array, measure)
 
 
 def _measure(base: Any) -> Measure | None:

@@ -51,7 +51,7 @@ def read_toml(path: str | Path) -> SystemDefinition:
         str(document.get("name", path.stem)),
         components,
         connections,
-        folder / _text(path, "inputs.file", inputs["file"]) if "file" in inputs else None,
+        _inputs(path, inputs),
         _experiment(path, _table(path, document, "experiment")),
     )
 
@@ -96,8 +96,25 @@ def _component(path: Path, folder: Path, name: str, entry: Any) -> Component:
     interface = entry.get("interface")
     if interface is not None and interface not in INTERFACES:
         raise MisfitError(f"{path}: {where}.interface is {interface!r}: give one of {', '.join(INTERFACES)}.")
+    if kinds[0] == FMU:
+        _require_file(path, f"{where}.fmu", Path(source))
     start, arguments = (_table(path, entry, key, f"{where}.") for key in ("start", "arguments"))
     return Component(name, kinds[0], source, start, arguments, interface)
+
+
+def _inputs(path: Path, table: Mapping[str, Any]) -> Path | None:
+    if "file" not in table:
+        return None
+    file = path.parent / _text(path, "inputs.file", table["file"])
+    _require_file(path, "inputs.file", file)
+    return file
+
+
+def _require_file(path: Path, where: str, file: Path) -> None:
+    if not file.is_file():
+        raise MisfitError(
+            f"{path}: {where} is {file}, and there is no such file: give its path, from the folder of this one."
+        )
 
 
 def _experiment(path: Path, entry: Mapping[str, Any]) -> Experiment:

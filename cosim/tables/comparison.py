@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import MisfitError
+from cosim.tables.input_table import read_columns
 
 WORDS = {"true": 1.0, "false": 0.0}
 ROUNDING = 1e-9
@@ -62,26 +62,23 @@ def deviations(
     Raises
     ------
     MisfitError
-        If the file is no table, or the run and the table have no variable or no time in common.
+        If the file is no table, has text for a number, or has no variable or no time in common with the run.
     """
-    with Path(path).open(newline="", encoding="utf-8-sig") as file:
-        rows = [row for row in csv.reader(file) if row]
-    if len(rows) < 2 or rows[0][0].strip().strip('"') != "time":
-        raise MisfitError(f"{path} is no table with a line of names that begins with time: give one.")
-    names = [name.strip().strip('"') for name in rows[0]]
-    if any(len(row) != len(names) for row in rows):
-        raise MisfitError(f"{path} has rows of another length than its line of names.")
-    grid, here = np.array([float(row[0]) for row in rows[1:]]), np.array(times)
-    if not times or grid[0] > here[-1] * (1.0 + ROUNDING) or grid[-1] < here[0]:
+    told, columns = read_columns(path)
+    grid, here = np.array(told), np.array(times)
+    within = (grid >= here[0]) & (grid <= here[-1] + ROUNDING * abs(here[-1])) if times else np.zeros(len(told), bool)
+    if not within.any():
         raise MisfitError(f"{path} and the run have no time in common.")
-    within = (grid >= here[0]) & (grid <= here[-1] + ROUNDING * abs(here[-1]))
     found: list[Deviation] = []
     missing: list[str] = []
-    for k, name in enumerate(names[1:], start=1):
-        texts = [row[k] for row, inside in zip(rows[1:], within, strict=True) if inside]
+    for name, column in columns.items():
+        texts = [text for text, inside in zip(column, within, strict=True) if inside]
         elements = _elements(name, texts, signals)
         missing += [] if elements else [name]
-        found += [_deviation(element, grid[within], of_it, here, signals[element]) for element, of_it in elements]
+        try:
+            found += [_deviation(element, grid[within], of_it, here, signals[element]) for element, of_it in elements]
+        except ValueError as error:
+            raise MisfitError(f"{path}, column {name}: {error}: give numbers.") from error
     if not found:
         raise MisfitError(f"{path} has none of the columns {', '.join(signals)}.")
     return found, missing

@@ -40,7 +40,7 @@ def read_inputs(path: str | Path, system: System) -> dict[str, Given]:
     MisfitError
         If it is no such table, with the line and the column; if an input is unknown or does not hold a value.
     """
-    times, columns = _columns(path)
+    times, columns = read_columns(path)
     inputs: dict[str, Given] = {}
     for name, texts in columns.items():
         for full_name, elements in _elements(system, path, name, texts):
@@ -49,15 +49,22 @@ def read_inputs(path: str | Path, system: System) -> dict[str, Given]:
     return inputs
 
 
-def _columns(path: str | Path) -> tuple[list[float], dict[str, list[str]]]:
+def read_columns(path: str | Path) -> tuple[list[float], dict[str, list[str]]]:
+    """Read a table over time as texts: the times in s, which do not fall, and the other columns by name.
+
+    Raises
+    ------
+    MisfitError
+        If it is no such table, with the line.
+    """
     try:
         with Path(path).open(newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if row]
     except (UnicodeDecodeError, csv.Error) as error:
         raise MisfitError(f"{path} is no file of comma-separated values in UTF-8: {error}.") from error
-    if len(rows) < 2 or rows[0][0].strip() not in ("time", "t"):
+    if len(rows) < 2 or _name(rows[0][0]) not in ("time", "t"):
         raise MisfitError(f"{path} has no line of names that begins with time, and a row below it: give them.")
-    names = [name.strip() for name in rows[0]]
+    names = [_name(field) for field in rows[0]]
     for line, row in enumerate(rows[1:], start=2):
         if len(row) != len(names):
             raise MisfitError(f"{path}, row {line}: it has {len(row)} fields, but there are {len(names)} names.")
@@ -68,6 +75,11 @@ def _columns(path: str | Path) -> tuple[list[float], dict[str, list[str]]]:
         if after < before:
             raise MisfitError(f"{path}, row {line}: the time {after:g} s comes after {before:g} s: sort the rows.")
     return times, {name: [row[k] for row in rows[1:]] for k, name in enumerate(names) if k > 0}
+
+
+def _name(field: str) -> str:
+    """Return a name without the blanks around it, and the quotes that blanks kept from being read as such."""
+    return field.strip().strip('"')
 
 
 def _time(path: str | Path, line: int, text: str) -> float:

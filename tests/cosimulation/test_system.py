@@ -1,5 +1,7 @@
 """Wiring is checked before anything runs, and refused with both names."""
 
+import re
+import zipfile
 from dataclasses import replace
 
 import pytest
@@ -170,6 +172,21 @@ def test_automata_measure_as_their_fmus_do(tmp_path):
         System([sender, AutomatonSlave("receiver", Warm())], {"receiver.u": "sender.sent"})
     fmu = FmuSlave("receiver", export_fmu(Warm(), tmp_path / "warm.fmu", kinds=("cs",)))
     assert fmu.inputs["u"].measure == AutomatonSlave("receiver", Warm()).inputs["u"].measure == CELSIUS
+
+
+@pytest.mark.parametrize(("fmi", "variable"), [("3.0", "<Float64"), ("2.0", "<Real")])
+def test_differences_are_converted_without_the_offset_of_their_unit(fmi, variable, tmp_path):
+    path = export_fmu(Warm(), tmp_path / "warm.fmu", kinds=("cs",), fmi=fmi)
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    text = members["modelDescription.xml"].decode()
+    changed = re.sub(rf'({variable}[^<>]*) unit="degC"', r'\1 unit="degC" relativeQuantity="true"', text)
+    assert changed != text
+    members["modelDescription.xml"] = changed.encode()
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    assert FmuSlave("warm", path).inputs["u"].measure == KELVIN
 
 
 def test_measures_of_fmus_are_those_that_they_declare(tmp_path):

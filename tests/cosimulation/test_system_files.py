@@ -124,7 +124,14 @@ def test_what_does_not_fit_is_refused(old, new, sentence, folder):
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [("period = 0.5", "perod = 0.5"), ('"b.count"]', '"b.cuont"]'), ("[inputs]", "[input]")]
+    ("old", "new"),
+    [
+        ("period = 0.5", "perod = 0.5"),
+        ('"b.count"]', '"b.cuont"]'),
+        ("[inputs]", "[input]"),
+        ('automaton = "blocks.py:Sum"', 'fmu = "nowhere.fmu"'),
+        ("in.csv", "nowhere.csv"),
+    ],
 )
 def test_a_slip_in_the_file_is_wrong_usage(old, new, folder, capsys):
     assert main(["cosim", str(changed(folder, old, new))]) == 2

@@ -178,6 +178,24 @@ def test_at_a_jump_either_side_is_right_and_texts_are_compared(tmp_path):
         deviations(table, [3.0, 4.0], {"x": [0.0, 0.0]})
 
 
+@pytest.mark.parametrize(
+    ("table", "sentence"),
+    [
+        (b"time,x\n0,0\n0.5,abc\n", "column x: could not convert string to float: 'abc'"),
+        (b"time,x\n0,0\nlate,1\n", "row 3: the time 'late' is no finite number"),
+        (b"time,x\n-1,0\n10,1\n", "and the run have no time in common"),
+        (b"time,x\n0,0\n1\n", "row 3: it has 1 fields, but there are 2 names"),
+        (b"\xff\xfe\x00", "no file of comma-separated values in UTF-8"),
+        (b"", "no line of names that begins with time"),
+    ],
+)
+def test_what_is_no_table_of_reference_is_refused(table, sentence, tmp_path):
+    path = tmp_path / "ref.csv"
+    path.write_bytes(table)
+    with pytest.raises(MisfitError, match=sentence):
+        deviations(path, [0.0, 1.0], {"x": [0.0, 1.0]})
+
+
 def test_events_are_logged_and_outputs_drawn(stranger, tmp_path):
     log, picture = tmp_path / "events.csv", tmp_path / "run.png"
     command = ["cosim", str(stranger()), "--start-value", "rate=2", "--event-log", str(log), "--plot", str(picture)]
