@@ -61,6 +61,7 @@ def run(options: argparse.Namespace) -> int:
             if options.step_study is not None:
                 return _study(scenario, options)
             system, experiment = _agents(scenario, folder, options.fmi), Experiment(stop_time=scenario.stop_time)
+            _set_starts(system.slaves, starts)
             fmus = [Component(name, FMU, str(folder / f"{name}.fmu")) for name in system.slaves]
             definition = SystemDefinition(scenario.name, fmus, broadcast_wires(scenario))
         else:
@@ -69,11 +70,10 @@ def run(options: argparse.Namespace) -> int:
                     definition,
                     components=[replace(c, interface=c.interface or options.interface) for c in definition.components],
                 )
-            system, experiment = _assembled(definition, options), definition.experiment
+            system, experiment = _assembled(definition, options, starts), definition.experiment
             options.input_file = options.input_file or definition.inputs
         if options.save_as is not None:
             return _save(options, definition, system, _completed(options, system, experiment))
-        _set_starts(system.slaves, starts)
         return _run(system, options, _completed(options, system, experiment))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -84,7 +84,7 @@ def _described(options: argparse.Namespace) -> SystemDefinition | None:
         return read_system(options.system)
 
 
-def _assembled(definition: SystemDefinition, options: argparse.Namespace) -> System:
+def _assembled(definition: SystemDefinition, options: argparse.Namespace, starts: dict[str, str]) -> System:
     with _slips_of(options):
         return assemble(
             definition,
@@ -92,6 +92,7 @@ def _assembled(definition: SystemDefinition, options: argparse.Namespace) -> Sys
             isolate=options.isolate,
             patience=options.call_timeout,
             loop_iterations=options.loop_iterations,
+            prepare=lambda slaves: _set_starts(slaves, starts),
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from cosim.automaton_slave import AutomatonSlave
@@ -26,6 +26,7 @@ def assemble(
     isolate: bool = False,
     patience: float = PATIENCE,
     loop_iterations: int = 0,
+    prepare: Callable[[dict[str, Slave]], None] | None = None,
 ) -> System:
     """Make a system: its slaves with their start values, and its connections.
 
@@ -40,6 +41,8 @@ def assemble(
         Seconds that one call of an isolated FMU may take.
     loop_iterations : int
         See `System`.
+    prepare : callable, optional
+        Given the slaves by name before they are connected: what else is set in them may change the sizes of arrays.
 
     Raises
     ------
@@ -52,7 +55,10 @@ def assemble(
     for component, slave in zip(definition.components, slaves, strict=True):
         for name, value in component.start.items():
             set_start(slave, name, value)
-    connections = unplugged(definition, {slave.name: slave for slave in slaves})
+    by_name = {slave.name: slave for slave in slaves}
+    if prepare is not None:
+        prepare(by_name)
+    connections = unplugged(definition, by_name)
     return System(slaves, connections, loop_iterations=loop_iterations)
 
 

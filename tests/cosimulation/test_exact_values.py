@@ -1,6 +1,8 @@
 """What variables of FMUs hold is exact by type; what they cannot hold is refused by name."""
 
+import csv
 import math
+import zipfile
 
 import pytest
 
@@ -150,6 +152,23 @@ def test_whole_numbers_are_shown_and_written_with_all_their_digits(stranger, tmp
         "00ff",
         "1",
     )
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_outputs_have_the_sizes_that_the_command_gives_them(size, stranger, tmp_path):
+    path, out = stranger(), tmp_path / "out.csv"
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    weights = b'name="weights" valueReference="8" causality='
+    text = members["modelDescription.xml"]
+    changed = text.replace(weights + b'"parameter" variability="fixed" start="1 1"', weights + b'"output"')
+    assert changed != text
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in (members | {"modelDescription.xml": changed}).items():
+            archive.writestr(name, content)
+    assert main(["cosim", str(path), "--start-value", f"size={size}", "--output-file", str(out)]) == 0
+    with out.open(newline="") as file:
+        assert {row["weights"] for row in csv.DictReader(file)} == {" ".join(["1.0"] * size)}
 
 
 def test_structural_parameters_are_set_in_configuration_mode(stranger, capsys):
