@@ -11,6 +11,7 @@ from cosim.sources import Linear, Source
 from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
 from fmu.archives.checks import LIMITS
 from fmu.archives.reading import Archive, ArchiveError
+from fmu.importer.loading import read_description
 from fmu.importer.plain_xml import PlainXmlError, parse_plain
 from fmu.importer.temporary_folders import temporary_folder
 
@@ -56,6 +57,7 @@ class _Reading:
         self._elements: dict[str, Any] = {}
         self._starts: dict[str, dict[str, Any]] = {}
         self._given: dict[Node, Any] = {}
+        self._units: dict[Node, str] = {}
         self._into: dict[Node, tuple[Node, float, float]] = {}
 
     def definition(self, path: Path) -> SystemDefinition:
@@ -72,7 +74,7 @@ class _Reading:
         if not components:
             raise self._misfit("it has no components")
         experiment = next(iter(_children(root, "DefaultExperiment")), None)
-        times = {} if experiment is None else {k: _number(experiment.get(k)) for k in ("startTime", "stopTime")}
+        times = {} if experiment is None else {k: self._time(experiment, k) for k in ("startTime", "stopTime")}
         return SystemDefinition(
             system.get("name", path.stem),
             components,
@@ -83,15 +85,19 @@ class _Reading:
 
     def _read_system(self, system: Any, path: str) -> None:
         """Note the components, wires and parameters of a system and of those in it; `path` is its name with a point."""
-        self._given |= {(path, name): value for name, value in self._parameters(system).items()}
+        self._given |= {(path, name): value for name, value in self._parameters(system, path).items()}
         paths = {None: path}
         for element in next(iter(_children(system, "Elements")), ()):
             name, kind = f"{path}{element.get('name')}", _local(element)
             paths[element.get("name")] = f"{name}." if kind == "System" else name
+            if kind in ("System", "Component") and not element.get("name"):
+                raise self._misfit(f"it has a {kind} without a name")
+            if name in self._elements:
+                raise self._misfit(f"two of its components are called {name}")
             if kind == "System":
                 self._read_system(element, f"{name}.")
             elif kind == "Component":
-                self._elements[name], self._starts[name] = element, self._parameters(element)
+                self._elements[name], self._starts[name] = element, self._parameters(element, name)
             elif kind not in ("Annotations", ""):
                 raise self._misfit(f"it has a {kind} {name!r}, and components and systems alone are supported")
         for wire in _children_of(next(iter(_children(system, "Connections")), ()), "Connection"):
@@ -101,7 +107,7 @@ class _Reading:
             source = paths[wire.get("startElement")], wire.get("startConnector")
             target = paths[wire.get("endElement")], wire.get("endConnector")
             told = f"its connection {_told(source)} -> {_told(target)}"
-            if wire.get("suppressUnitConversion") == "true":
+            if wire.get("suppressUnitConversion") in ("true", "1"):
                 raise self._misfit(f"{told} suppresses the conversion of units, which is not supported")
             if target in self._into:
                 raise self._misfit(f"{_told(target)} is connected twice")
@@ -123,7 +129,9 @@ class _Reading:
                 scaled = (factor, offset) != (1.0, 0.0)
                 connections[_told(target)] = Linear(_told(at), factor, offset) if scaled else _told(at)
             elif at in self._given:
-                self._starts[target[0]].setdefault(target[1], _scaled(self._given[at], factor, offset))
+                if target[1] not in self._starts[target[0]] and at in self._units:
+                    self._units[target] = self._units[at]
+                self._starts[target[0]].setdefault(target[1], self._scaled(self._given[at], factor, offset, at))
         return connections
 
     def _scale(self, element: Any, told: str) -> tuple[float, float]:
@@ -133,7 +141,11 @@ class _Reading:
             return 1.0, 0.0
         if _local(found[0]) != "LinearTransformation":
             raise self._misfit(f"{told} has a {_local(found[0])}, and linear ones alone are supported")
-        return float(found[0].get("factor", "1")), float(found[0].get("offset", "0"))
+        factor, offset = (
+            self._number(found[0].get(name, default), f"the {name} of {told}")
+            for name, default in (("factor", "1"), ("offset", "0"))
+        )
+        return factor, offset
 
     def _component(self, name: str, element: Any) -> Component:
         source, kind = element.get("source"), element.get("type")
@@ -143,9 +155,26 @@ class _Reading:
         if implementation not in _IMPLEMENTATIONS:
             raise self._misfit(f"its component {name} is for {implementation}, which no master runs")
         file, start = self._file(source, f"component {name}"), self._starts[name]
+        self._require_units(name, file)
         return Component(name, FMU, str(file), start, {}, _IMPLEMENTATIONS[implementation])
 
-    def _parameters(self, element: Any) -> dict[str, Any]:
+    def _require_units(self, name: str, file: Path) -> None:
+        """Refuse parameters in other units than the FMU has them in, which are not converted."""
+        told = {variable: unit for (place, variable), unit in self._units.items() if place == name}
+        if not told:
+            return
+        try:
+            description = read_description(str(file), validate=False)
+        except Exception:  # noqa: BLE001 - whatever fmpy raises, the slave says what is wrong
+            return
+        own = {v.name: v.unit or (v.declaredType.unit if v.declaredType else None) for v in description.modelVariables}
+        for variable, unit in told.items():
+            wanted = own.get(variable, own.get(variable.partition("[")[0]))
+            if wanted and wanted != unit:
+                told_in = f"its parameter {name}.{variable} is in {unit!r}, but the FMU has it in {wanted!r}"
+                raise self._misfit(f"{told_in}, and parameters are not converted: give it in that unit")
+
+    def _parameters(self, element: Any, place: str) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for binding in _children_of(next(iter(_children(element, "ParameterBindings")), ()), "ParameterBinding"):
             prefix = binding.get("prefix", "")
@@ -155,21 +184,24 @@ class _Reading:
                 inline = [s for v in _children(binding, "ParameterValues") for s in _children(v, "ParameterSet")]
                 found = {name: value for one in inline for name, value in self._set(one).items()}
             mapping = self._mapping(binding)
-            for name, value in found.items():
+            for name, (value, unit) in found.items():
                 target, factor, offset = mapping.get(prefix + name, (prefix + name, 1.0, 0.0))
-                values[target] = _scaled(value, factor, offset)
+                values[target] = self._scaled(value, factor, offset, (place, target))
+                if unit is not None:
+                    self._units[place, target] = unit
         return values
 
-    def _set(self, root: Any) -> dict[str, str | list[str]]:
-        values: dict[str, str | list[str]] = {}
+    def _set(self, root: Any) -> dict[str, tuple[str | list[str], str | None]]:
+        """Return the values of a set of parameters and their units, as they are written."""
+        values: dict[str, tuple[str | list[str], str | None]] = {}
         for parameter in _children_of(next(iter(_children(root, "Parameters")), ()), "Parameter"):
-            is_array, name = bool(_children(parameter, "Dimension")), parameter.get("name")
+            is_array, name = bool(_children(parameter, "Dimension")), parameter.get("name", "")
             for typed in parameter:
                 listed = [element.get("value") for element in _children(typed, "Value")]
                 if listed:
-                    values[name] = listed if is_array else listed[0]
+                    values[name] = listed if is_array else listed[0], typed.get("unit")
                 elif typed.get("value") is not None:
-                    values[name] = typed.get("value").split() if is_array else typed.get("value")
+                    values[name] = typed.get("value").split() if is_array else typed.get("value"), typed.get("unit")
         return values
 
     def _mapping(self, binding: Any) -> dict[str, tuple[str, float, float]]:
@@ -195,18 +227,29 @@ class _Reading:
         except (PlainXmlError, OSError) as error:
             raise self._misfit(str(error)) from error
 
+    def _time(self, experiment: Any, name: str) -> float | None:
+        text = experiment.get(name)
+        return None if text is None else self._number(text, name)
+
+    def _number(self, text: str, what: str) -> float:
+        try:
+            return float(text)
+        except ValueError:
+            raise self._misfit(f"{what} is {text!r}, which is no number") from None
+
+    def _scaled(self, value: Any, factor: float, offset: float, node: Node) -> Any:
+        if (factor, offset) == (1.0, 0.0):
+            return value
+        if isinstance(value, list):
+            return [self._scaled(one, factor, offset, node) for one in value]
+        return factor * self._number(value, _told(node)) + offset
+
     def _misfit(self, why: str) -> MisfitError:
         return MisfitError(f"{self._told} cannot be run: {why}.")
 
 
 def _told(node: Node) -> str:
     return f"{node[0]}.{node[1]}" if node[0] and not node[0].endswith(".") else f"{node[0]}{node[1]}"
-
-
-def _scaled(value: Any, factor: float, offset: float) -> Any:
-    if isinstance(value, list):
-        return [_scaled(one, factor, offset) for one in value]
-    return value if (factor, offset) == (1.0, 0.0) else factor * float(value) + offset
 
 
 def _local(element: Any) -> str:
@@ -219,7 +262,3 @@ def _children(element: Any, name: str) -> list[Any]:
 
 def _children_of(elements: Any, name: str) -> list[Any]:
     return [element for element in elements if _local(element) == name]
-
-
-def _number(text: str | None) -> float | None:
-    return None if text is None else float(text)

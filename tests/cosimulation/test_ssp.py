@@ -93,6 +93,14 @@ class Gain(hm.HybridAutomaton):
         return {"y": s.k * s.u}
 
 
+class Rod(hm.HybridAutomaton):
+    length = hm.Parameter(1.0, unit="m")
+    y = hm.Output()
+
+    def outputs(self, s):
+        return {"y": s.length}
+
+
 @pytest.fixture
 def by_hand(stranger, tmp_path):
     """Write an SSP as another tool may have."""
@@ -185,6 +193,12 @@ def test_signals_are_scaled_and_written_as_they_are(tmp_path, exported):
             {"wires": '<ssd:Connection startElement="z" startConnector="y" endElement="a" endConnector="heard"/>'},
             "a connection names 'z', which is no component",
         ),
+        (
+            {"wires": WIRE.format('<ssc:LinearTransformation factor="two"/>')},
+            "the factor of its connection .* is 'two'",
+        ),
+        ({"more": '<ssd:Component name="a" source="resources/stranger.fmu"/>'}, "two of its components are called a"),
+        ({"more": '<ssd:Component source="resources/stranger.fmu"/>'}, "it has a Component without a name"),
         ({"prefix": "<!DOCTYPE x [<!ENTITY e 'e'>]>"}, "SystemStructure.ssd has a DOCTYPE"),
         ({"prefix": "\0"}, "is not in UTF-8"),
         ({"prefix": "<"}, "is no XML"),
@@ -193,6 +207,29 @@ def test_signals_are_scaled_and_written_as_they_are(tmp_path, exported):
 def test_what_cannot_be_run_is_refused(told, sentence, by_hand):
     with pytest.raises(MisfitError, match=sentence):
         read_ssp(by_hand(**told))
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_parameters_in_another_unit_than_the_fmus_are_refused(fmi, tmp_path, exported):
+    """The value is not converted, and would be a hundred times too long."""
+    (tmp_path / "system.toml").write_text(
+        f'[components.rod]\nfmu = "{exported(Rod(), "rod", fmi)}"\nstart = {{ length = 250.0 }}\n'
+    )
+    definition, path = read_system(tmp_path / "system.toml"), tmp_path / "rod.ssp"
+    write_ssp(definition, assemble(definition), path)
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    value = b'<ssv:Real value="250.0"'
+    assert value in members["SystemStructure.ssd"]
+    for unit in ("cm", "m"):
+        content = members["SystemStructure.ssd"].replace(value, value + b' unit="%s"' % unit.encode())
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, old in members.items():
+                archive.writestr(name, content if name == "SystemStructure.ssd" else old)
+        if unit == "cm":
+            with pytest.raises(MisfitError, match=r"rod\.length is in 'cm', but the FMU has it in 'm'"):
+                read_ssp(path)
+    assert read_ssp(path).components[0].start == {"length": "250.0"}
 
 
 def test_a_path_out_of_the_archive_is_refused(by_hand, tmp_path):
