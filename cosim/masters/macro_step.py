@@ -10,7 +10,7 @@ from cosim.errors import CosimError
 from cosim.feedthrough import told_loop
 from cosim.masters.changes import Changes
 from cosim.masters.signal_history import SignalHistory
-from cosim.slave import Slave
+from cosim.slave import Port, Slave
 from cosim.system import System
 from hybrid_model.declare.variables import FloatArray
 from hybrid_model.schedule.blocks import Termination
@@ -100,12 +100,15 @@ class MacroSteps:
         inside = [slave for slave in system.slaves.values() if not slave.has_event_mode]
         self._shown = {slave.name: slave.reader(list(slave.outputs)) for slave in inside}
         self._leaping = [(s, self._shown[s.name]) for s in inside if s.name in self._fed]
-        self._inside = [c for c in self._held if not system.slaves[c.source].has_event_mode]
+        # Where inputs change along flows, a jump within a step is seen by outputs that nobody hears of too.
+        told = dict.fromkeys((c.source, c.output) for c in self._held if not system.slaves[c.source].has_event_mode)
+        told |= dict.fromkeys((s.name, o) for s, _ in self._leaping for o in s.outputs if not _flows(s.outputs[o]))
+        self._inside = [(system.slaves[name], output) for name, output in told]
         names = [name for name in system.output_names if _is_flowing_number(system, name)]
         self.observe: Callable[[], list[float]] = system.reader(names)
         self.owners = [system.output(name)[0].name for name in names]
         self._alone = system.reader([name for name in names if not system.output(name)[0].has_event_mode])
-        self._known: dict[int, Any] = {}
+        self._known: list[Any] = []
         self._at = dict.fromkeys(system.slaves, t)
         self.meet_at_events = not self._fed and all(
             slave.has_event_mode or slave.stops_after_events for slave in system.slaves.values()
@@ -149,7 +152,7 @@ class MacroSteps:
 
     def remember(self) -> None:
         """Note what the slaves without event mode say at events, to see a change."""
-        self._known = {k: self._system.get(f"{c.source}.{c.output}") for k, c in enumerate(self._inside)}
+        self._known = [slave.get(output) for slave, output in self._inside]
 
     def save(self) -> States:
         """Return the state of all slaves."""
@@ -210,11 +213,11 @@ class MacroSteps:
         values = self.signals(t_next)
         outcome.due |= {slave.name for slave in self._probed if self._probe(slave, t_next)}
         outcome.pending = any(self._leaps(slave, read, t_next) for slave, read in self._leaping)
-        for k, c in enumerate(self._inside):
-            if self._system.get(f"{c.source}.{c.output}") != self._known[k]:
-                outcome.due.add(c.source)
+        for (slave, output), known in zip(self._inside, self._known, strict=True):
+            if slave.get(output) != known:
+                outcome.due.add(slave.name)
                 # What ends its steps after events has its event here, or it had ended before.
-                outcome.exact |= self._system.slaves[c.source].stops_after_events and c.source not in self._fed
+                outcome.exact |= slave.stops_after_events and slave.name not in self._fed
         return outcome, values
 
     def settle(self, name: str) -> Termination | None:
@@ -273,5 +276,8 @@ def _differ(before: Sequence[Any], after: Sequence[Any]) -> bool:
 
 def _is_flowing_number(system: System, name: str) -> bool:
     slave, port = system.output(name)
-    output = slave.outputs[port]
+    return _flows(slave.outputs[port])
+
+
+def _flows(output: Port) -> bool:
     return output.kind == "number" and not output.discrete and not output.whole

@@ -86,6 +86,46 @@ def test_a_signal_goes_through_an_fmu_whose_output_follows_at_once(fmus, two_bal
     np.testing.assert_allclose(result.event_times("second"), two_balls.event_times("second.jump"), atol=TIME, rtol=0)
 
 
+class CountsRises(hm.HybridAutomaton):
+    """Counts how often its input has risen above a half."""
+
+    u = hm.Input(0.0)
+    above = hm.DiscreteState(0.0)
+    count = hm.DiscreteState(0.0, output=True)
+
+    def rises(self, s):
+        return hm.least(s.u - 0.5, 0.5 - s.above)
+
+    def falls(self, s):
+        return hm.least(0.4 - s.u, s.above - 0.5)
+
+    transitions = (
+        hm.Jump("rise", rises, lambda self, s: {"above": 1.0, "count": s.count + 1.0}),
+        hm.Jump("fall", falls, lambda self, s: {"above": 0.0}),
+    )
+
+
+class Oscillates(hm.HybridAutomaton):
+    a = hm.State(0.0, output=True)
+    b = hm.State(1.0)
+
+    def flow_map(self, s):
+        return {"a": 3.0 * s.b, "b": -3.0 * s.a}
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_events_are_met_that_nobody_else_hears_of(fmi, tmp_path):
+    """sin(3 t) rises above a half at (pi/6 + 2 pi k)/3; the count is connected to nothing."""
+    parts = {"source": Oscillates(), "sink": CountsRises()}
+    slaves = [
+        FmuSlave(name, export_fmu(part, tmp_path / f"{name}.fmu", fmi=fmi, kinds=("cs",)))
+        for name, part in parts.items()
+    ]
+    result = run_error_controlled(System(slaves, {"sink.u": "source.a"}), 5.0)
+    expected = (np.pi / 6.0 + 2.0 * np.pi * np.arange(3)) / 3.0
+    np.testing.assert_allclose(result.event_times("sink"), expected, atol=TIME, rtol=0)
+
+
 def test_a_ball_on_an_oscillating_table():
     wires = {"ball.table": "table.height", "ball.table_velocity": "table.velocity"}
     parts = {"table": OscillatingTable(), "ball": BallOnMovingTable()}
