@@ -75,8 +75,8 @@ def tuned_value(variable: Variable, given: npt.ArrayLike, what: str = "parameter
 
     if value.shape not in ((), variable.shape):
         raise DeclarationError(
-            f"{told()}, of shape {value.shape}: give one number for all elements, or an array of shape "
-            f"{variable.shape}."
+            f"{told()}, of shape {value.shape}: give one number"
+            + (f" for all elements, or an array of shape {variable.shape}." if variable.shape else ".")
         )
     low = -np.inf if variable.minimum is None else variable.minimum
     high = np.inf if variable.maximum is None else variable.maximum

@@ -240,7 +240,7 @@ class Declaration(ExplainedCall, ClassAttribute):
         if given.shape not in ((), shape):
             raise DeclarationError(
                 f"{owner}.{name} has shape {shape}, but the value given has shape {given.shape}: "
-                f"give one number for all elements, or an array of shape {shape}."
+                + (f"give one number for all elements, or an array of shape {shape}." if shape else "give one number.")
             )
         start = np.full(shape, given) if given.shape == () else given
         if self.traits.get("integer") and not np.all(start == np.round(start)):

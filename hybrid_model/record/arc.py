@@ -326,7 +326,7 @@ class HybridArc:
         return dataset(self._record, self.samples(names))
 
     def save(self, path: str | Path) -> None:
-        """Write the arc to a file; its name decides in which form.
+        """Write the arc to a file, in a folder made if need be; its name decides in which form.
 
         Parameters
         ----------

@@ -49,7 +49,6 @@ def write_columns(
     """
     path = Path(path)
     require_ending(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     with replaced(path) as part:
         _WRITERS[path.suffix.lower()](part, columns, units or {}, about or {})
 
@@ -71,7 +70,8 @@ def require_ending(path: str | Path) -> None:
 
 @contextmanager
 def replaced(path: Path) -> Iterator[Path]:
-    """Give a path beside a file that takes its place when all went well, and else goes."""
+    """Give a path beside a file, whose folder is made, that takes its place when all went well, and else goes."""
+    path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{os.getpid()}-{path.name}")
     try:
         yield part

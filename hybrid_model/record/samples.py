@@ -61,6 +61,12 @@ class Samples:
     def __len__(self) -> int:
         return int(self.t.size)
 
+    def __repr__(self) -> str:
+        span = (
+            f" at t from {self.t[0]:g} to {self.t[-1]:g} s, j from {self.j[0]} to {self.j[-1]}" if self.t.size else ""
+        )
+        return f"Samples({len(self)}{span}: {', '.join(self.values)})"
+
     def __getitem__(self, name: str) -> FloatArray:
         """Return a variable's values, shape (n, *shape)."""
         if name not in self.values:

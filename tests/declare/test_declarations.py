@@ -107,7 +107,10 @@ def test_the_given_array_is_copied():
     ("values", "sentence"),
     [
         ({"mass": 1.0}, r"BouncingBall has nothing named 'mass' to set; it has h, v, g, e\."),
-        ({"h": [1.0, 2.0]}, r"BouncingBall\.h has shape \(\), but the value given has shape \(2,\): give one number"),
+        (
+            {"h": [1.0, 2.0]},
+            r"BouncingBall\.h has shape \(\), but the value given has shape \(2,\): give one number\.$",
+        ),
         ({"h": math.nan}, r"BouncingBall\.h = nan is not finite: start values and parameters must be finite"),
         ({"e": "bouncy"}, r"BouncingBall\.e = 'bouncy' is not a number"),
         ({"h": None}, r"BouncingBall\.h = None is not"),

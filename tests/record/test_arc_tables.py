@@ -52,6 +52,18 @@ def test_samples_of_an_arc_are_its_samples(arc):
         samples["v"]
 
 
+@pytest.mark.parametrize("ending", ["npz", "csv", "mat", "nc"])
+def test_an_arc_is_saved_into_a_folder_that_is_made(ball, tmp_path, ending):
+    path = tmp_path / "new" / "folder" / f"run.{ending}"
+    ball.save(path)
+    assert [found.name for found in path.parent.iterdir()] == [path.name]
+
+
+def test_samples_tell_their_size_and_names_and_not_their_numbers(ball):
+    assert repr(ball.samples()) == f"Samples({len(ball.t)} at t from 0 to 2 s, j from 0 to {len(ball.jumps)}: h, v)"
+    assert repr(hm.Samples([], [], {})) == "Samples(0: )"
+
+
 def test_a_dataframe_has_index_t_j_scalar_columns_and_units(arc):
     frame = arc.to_dataframe()
     assert list(frame.columns) == ["x", "w[1]", "w[2]", "m[1,1]", "m[1,2]", "m[2,1]", "m[2,2]", "y[1]", "y[2]"]

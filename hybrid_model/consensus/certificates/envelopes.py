@@ -8,7 +8,7 @@ from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.own_trigger import OwnTrigger
 from hybrid_model.consensus.scenario.trigger import TriggerKind
 
-__all__ = ["Envelope", "error_envelope", "sampled_threshold"]
+__all__ = ["Envelope", "error_envelope", "sampled_threshold", "slowest_decay"]
 
 Envelope = tuple[tuple[float, float], ...]
 """Pairs (c, beta): ``|e_i(t)| <= sum of c exp(-beta t)``."""
@@ -30,6 +30,14 @@ def error_envelope(scenario: Scenario) -> Envelope | None:
     if trigger.has_level and trigger.kind is not TriggerKind.SAMPLED:
         return trigger.threshold_in_time.exponentials
     return None
+
+
+def slowest_decay(scenario: Scenario) -> float:
+    """The beta [1/s] of the part of the errors that fades last, which decides about radii and rates.
+
+    The trigger's own number where no bound on the errors is known in advance.
+    """
+    return min((beta for _, beta in error_envelope(scenario) or ()), default=scenario.trigger.decay)
 
 
 def sampled_threshold(

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid_model.consensus.certificates.bounds import Bounds
 from hybrid_model.consensus.certificates.components import active_edges, connected_components, listed
-from hybrid_model.consensus.certificates.envelopes import error_envelope
+from hybrid_model.consensus.certificates.envelopes import error_envelope, slowest_decay
 from hybrid_model.consensus.certificates.idle_windows import idle_tree_edges, idle_window
 from hybrid_model.consensus.messages import enumerated
 from hybrid_model.consensus.scenario.definition import Scenario
@@ -140,7 +140,7 @@ def bound_hypotheses(bounds: Bounds) -> list[CheckedHypothesis]:
         Of a scenario whose union of graphs is connected.
     """
     analysis = bounds.analysis
-    constants, decay = analysis.tree_weights, analysis.scenario.trigger.decay
+    constants, decay = analysis.tree_weights, slowest_decay(analysis.scenario)
     excited, all_excited = bounds.printed.rate > 0, bounds.improved_rate > 0
     found = [
         _check(

@@ -33,7 +33,7 @@ def scenario_notes(bounds: Bounds, hypotheses: Sequence[CheckedHypothesis], seen
     for checked in hypotheses:
         if not checked.holds:
             yield f"{checked.failure} {_remains(checked.name, bounds)}".strip()
-    yield from _constants(bounds.analysis)
+    yield from _constants(bounds)
     yield from _accuracy(bounds)
     yield from _corollary(bounds.analysis)
     yield from _radius_notes(bounds)
@@ -100,7 +100,8 @@ def _without_uniform_gap(bounds: Bounds, end: float) -> str:
     )
 
 
-def _constants(analysis: Analysis) -> Iterator[str]:
+def _constants(bounds: Bounds) -> Iterator[str]:
+    analysis = bounds.analysis
     window = analysis.window
     tree, m, n = analysis.tree_weights, analysis.tree_coordinates, analysis.disagreement
     yield (
@@ -110,9 +111,12 @@ def _constants(analysis: Analysis) -> Iterator[str]:
         f"||int N||_F = {n.frobenius:.7g}."
     )
     scenario = analysis.scenario
-    error = 2 * scenario.trigger.threshold * math.sqrt(scenario.network.agents - 1)
+    error = ""
+    if bounds.envelope is not None:
+        total = 2 * sum(c for c, _ in bounds.envelope) * math.sqrt(scenario.network.agents - 1)
+        error = f" and C = 2 c sqrt(p) = {total:.7g}"
     yield (
-        f"With this tree rho = {analysis.tree.rho:.7g} and C = 2 c sqrt(p) = {error:.7g}; "
+        f"With this tree rho = {analysis.tree.rho:.7g}{error}; "
         f"||x_e(0)|| = {edge_norm(scenario, np.asarray(scenario.network.initial)):.7g}."
     )
     if analysis.spectrum is not None and not analysis.spectrum.is_scaled:

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from hybrid_model.consensus.certificates.certify import Certificates
+from hybrid_model.consensus.certificates.envelopes import slowest_decay
 from hybrid_model.consensus.certificates.forms import Form, Quantity
 from hybrid_model.consensus.certificates.tree_bound import ConvergenceBound
 from hybrid_model.consensus.figures.style import (
@@ -109,7 +110,9 @@ def plot_edge_norm(
     missing = []
     curves = certified_curves(found, float(norm[0]), grid)
     if found is not None and not curves:
-        missing.append(Line2D([], [], linestyle="none", label="no exact bound"))
+        is_without_period = found.value(Quantity.RATE, Form.FLOQUET) is None
+        why = "no bound: weights without a period" if is_without_period else "no exact bound"
+        missing.append(Line2D([], [], linestyle="none", label=why))
     for form, values in curves.items():
         ax.semilogy(grid, values, color=FORMS[form]["color"], linestyle=_EDGE_LINES[form], label=f"{form} bound")
     for bound in bounds:
@@ -149,8 +152,7 @@ def certified_curves(found: Certificates | None, start: float, t: FloatArray) ->
     rate, factor = (found.value(quantity, Form.FLOQUET) for quantity in (Quantity.RATE, Quantity.TRANSIENT))
     if rate is None or factor is None:
         return {}
-    trigger = found.scenario.trigger
-    decay = 0.0 if trigger.offset > 0.0 else trigger.decay
+    decay = slowest_decay(found.scenario)
     radii = {form: found.value(Quantity.RADIUS, form) for form in (Form.EXACT, Form.ENERGY)}
     left = factor * start * np.exp(-rate * t)
     return {form: left + radius * np.exp(-decay * t) for form, radius in radii.items() if radius is not None}

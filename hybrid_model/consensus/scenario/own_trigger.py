@@ -134,6 +134,12 @@ class OwnTrigger(Trigger):
                 f"{method} of the trigger {self.name} gives {promised!r}; it must give a Threshold(c, beta, c0), which "
                 "stands for c0 + c exp(-beta t), or None."
             )
+        if promised is not None and not promised.is_possible:
+            raise ScenarioError(
+                f"{method} of the trigger {self.name} gives c = {promised.threshold:g}, beta = {promised.decay:g} and "
+                f"c0 = {promised.offset:g}; they must be finite and not negative, and c + c0 positive: give the "
+                "trigger other numbers, or mend the promise."
+            )
         return promised
 
 

@@ -117,6 +117,12 @@ class Threshold:
         return self.offset + self.threshold * np.exp(-self.decay * t)
 
     @property
+    def is_possible(self) -> bool:
+        """Whether numbers c, beta and c0 are finite and not negative, and c + c0 is positive."""
+        numbers = (self.threshold, self.decay, self.offset)
+        return all(0 <= number < math.inf for number in numbers) and self.threshold + self.offset > 0
+
+    @property
     def exponentials(self) -> tuple[tuple[float, float], ...]:
         """Pairs (c, beta) of the exponentials ``c exp(-beta t)`` that it is the sum of."""
         decaying = (self.threshold, self.decay)

@@ -32,7 +32,7 @@ def read_own_weights(table: Entries, edges: int, folder: Path) -> tuple[Function
         If the function cannot be found, imported or called with the numbers, or its values are no weights.
     """
     target, function = table.text("kind"), table.named("kind", folder)
-    if not callable(function):
+    if not callable(function) or isinstance(function, type):
         raise ScenarioError(f"[weights] kind is '{target}', which is {function!r}; it must be a function of time.")
     given = {key: table.per_edge(key, edges) for key in table if key not in ("kind", "kinks", "period")}
     kinks = table.numbers("kinks") if "kinks" in table else ()

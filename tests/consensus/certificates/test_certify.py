@@ -197,6 +197,8 @@ class TestOtherTriggers:
         assert second.value("radius", "exact") == pytest.approx(first.value("radius", "exact"), rel=1e-12)
         assert second.value("radius", "printed") is None
         assert second.value("min_gap", "improved") <= second.value("min_gap", "observed")
+        # Beta is that of the part which lasts, so no hypothesis of a value that exists fails.
+        assert set(failed(second)) == {"trigger of the paper"}
 
     def test_self_triggered_runs_are_those_of_the_dynamic_trigger(self):
         trigger = {"threshold": 0.3, "decay": 0.1}

@@ -29,6 +29,7 @@ from hybrid_model.consensus import (
     run_report,
     scenario_agents,
 )
+from hybrid_model.consensus.figures.run import certified_curves
 from hybrid_model.declare.variables import Kind
 
 LAW = '''
@@ -167,6 +168,20 @@ def test_promises_give_the_bounds_of_a_law_that_keeps_the_same():
     for quantity, form in (("radius", "exact"), ("radius", "energy"), ("min_gap", "improved")):
         assert known.value(quantity, form) > 0
         assert promised.value(quantity, form) == pytest.approx(known.value(quantity, form), rel=1e-12)
+    # What is said beside the bounds goes by the promise too: beta in the hypotheses and curves, C in the notes.
+    hypotheses = [
+        {h.name: h.detail for h in found.hypotheses if h.name.startswith("beta")} for found in (known, promised)
+    ]
+    assert hypotheses[1] == hypotheses[0]
+    assert len(hypotheses[0]) == 4
+    assert all("beta is 0.001/s" in detail for detail in hypotheses[0].values())
+    constants = [next(note for note in found.notes if "C = 2 c" in note) for found in (known, promised)]
+    assert constants[1] == constants[0]
+    t = np.linspace(0.0, 50.0, 5)
+    curves = [certified_curves(found, 1.0, t) for found in (known, promised)]
+    for form, values in curves[0].items():
+        np.testing.assert_allclose(curves[1][form], values, rtol=1e-12)
+    assert curves[0]
 
 
 def test_a_law_that_promises_nothing_gets_no_radius_and_no_gap():
@@ -175,6 +190,7 @@ def test_a_law_that_promises_nothing_gets_no_radius_and_no_gap():
     assert found.value("radius", "exact") is None
     assert found.value("min_gap", "improved") is None
     assert found.value("rate", "floquet") > 0
+    assert not any("C = 2 c" in note for note in found.notes)
 
 
 def test_weights_are_a_function_of_ones_own(tmp_path):
@@ -251,9 +267,12 @@ class TestRefusals:
             closed_loop(ring, weights=[1.0, 2.0, 3.0])
         with pytest.raises(ScenarioError, match=r"motion is .*Exponential.*; give a class derived from .*Integrator"):
             closed_loop(ring, motion=Exponential)
-        (tmp_path / "waves.py").write_text("NUMBER = 1.0\ndef falling(t, slope=1.0): return 1 - slope * t\n")
+        (tmp_path / "waves.py").write_text(
+            "NUMBER = 1.0\nclass Wave: pass\ndef falling(t, slope=1.0): return 1 - slope * t\n"
+        )
         for kind, message in [
             ("waves.py:NUMBER", r"kind is 'waves.py:NUMBER', which is 1.0; it must be a function"),
+            ("waves.py:Wave", r"kind is 'waves.py:Wave', which is <class .*>; it must be a function"),
             (
                 "waves.py:falling",
                 r"edge 1: 'waves.py:falling' cannot be used: the weight at t = .* must not be negative",
@@ -271,3 +290,10 @@ class TestRefusals:
 
         with pytest.raises(ScenarioError, match=r"error_bound of the trigger Vague gives .*must give a Threshold"):
             certify(replace(read_scenario(RING), trigger=OwnTrigger(law=Vague)))
+
+    @pytest.mark.parametrize("values", [{"c": -0.1}, {"c": 0.0}, {"beta": -0.1}])
+    def test_of_promises_that_cannot_be_kept(self, values):
+        with pytest.raises(
+            ScenarioError, match=r"error_bound of the trigger Exponential gives c = .*finite and not negative"
+        ):
+            certify(replace(read_scenario(RING), trigger=OwnTrigger(law=Exponential, values=values)))
