@@ -245,7 +245,7 @@ def _master(
     interval = experiment.output_interval
     if interval is None:
         interval = _part(t_stop - t_start, OUTPUT_INTERVAL) if dense or proposed is None else proposed
-    rows = bool(options.output_file or options.plot or options.show_plot)
+    rows = bool(options.output_file or options.plot or options.show_plot or options.reference_file)
     if master == ERROR_CONTROLLED:
         return run_error_controlled(
             system,

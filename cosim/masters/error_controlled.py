@@ -12,7 +12,7 @@ from cosim.errors import CosimError, MisfitError
 from cosim.feedthrough import refuse_loops
 from cosim.masters.changes import Changes, Given
 from cosim.masters.event_iteration import iterate_events
-from cosim.masters.macro_step import MacroSteps, Outcome
+from cosim.masters.macro_step import MacroSteps, Outcome, States
 from cosim.masters.start import MOST_STEPS, outputs, require_times, sample_change, sample_end, start_slaves
 from cosim.masters.treatments import with_rollback
 from cosim.replayed_slave import ReplayedSlave
@@ -24,6 +24,8 @@ from hybrid_model.schedule.scheduler import Event
 
 TOLERANCE = 1e-9
 """Error of a macro step, as a part of the largest value that each signal has had."""
+AHEAD = 1e-10
+"""Part of the time by which the row before a jump is before it: FMUs take jumps that are just behind a step in it."""
 RESOLUTION = 1e-13
 """Of times of events, as a part of the run."""
 AT_ONE_TIME = 100
@@ -196,11 +198,13 @@ class _Run:
             outcome, values = self._attempt(t, end)
             if h <= 2.0 * self._resolution:
                 outcome.due |= self._jumped(before)
+                self._row_before(states, t, end, outcome)
                 # Where nothing was in the way the accuracy was: signals that rise from zero are all surprise there.
                 self._h = MOST * h
                 self._arrive(end, values, outcome)
                 return
             if macro.meet_at_events and (outcome.quiet or outcome.believed):
+                self._row_before(states, t, end, outcome)
                 self._arrive(end, values, outcome)
                 return
             if outcome.quiet or outcome.believed:
@@ -211,6 +215,7 @@ class _Run:
                     macro.history.add(middle, values)
                     outcome, values = self._attempt(middle, end)
                     if (outcome.quiet or outcome.believed) and self._is_accurate(whole, end, values, h):
+                        self._row_before(states, t, end, outcome)
                         self._arrive(end, values, outcome)
                         return
                 elif outcome.believed:
@@ -302,6 +307,28 @@ class _Run:
         """Return all outputs of a slave."""
         slave = self._system.slaves[name]
         return [slave.get(output) for output in slave.outputs]
+
+    def _row_before(self, states: States, t: float, end: float, outcome: Outcome) -> None:
+        """Keep the row before the jumps that slaves without event mode have made in the step from `t` to `end`, in s.
+
+        All go back to the states that they had at `t`, and as far as next to the jumps.
+        """
+        inside = any(not self._system.slaves[name].has_event_mode for name in outcome.due)
+        # What is run again from the start cannot come back to a state that is later.
+        again = any(isinstance(slave, ReplayedSlave) for slave in self._system.slaves.values())
+        if not (self._rows and inside) or again or outcome.ended:
+            return
+        macro = self.macro
+        made = macro.save()
+        try:
+            macro.restore(states)
+            near = end - max(self._resolution, AHEAD * abs(end))
+            if end - t > 2.0 * self._resolution and near > t:
+                self._attempt(t, near)
+            self._row(end)
+        finally:
+            macro.restore(made)
+            macro.release(made)
 
     def _row(self, t: float) -> None:
         if self._rows:

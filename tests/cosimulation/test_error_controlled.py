@@ -121,9 +121,24 @@ def test_events_are_met_that_nobody_else_hears_of(fmi, tmp_path):
         FmuSlave(name, export_fmu(part, tmp_path / f"{name}.fmu", fmi=fmi, kinds=("cs",)))
         for name, part in parts.items()
     ]
-    result = run_error_controlled(System(slaves, {"sink.u": "source.a"}), 5.0)
+    result = run_error_controlled(System(slaves, {"sink.u": "source.a"}), 5.0, output_interval=1.0, record_events=True)
     expected = (np.pi / 6.0 + 2.0 * np.pi * np.arange(3)) / 3.0
     np.testing.assert_allclose(result.event_times("sink"), expected, atol=TIME, rtol=0)
+    for count, t in enumerate(result.event_times("sink")):
+        assert _rows(result, t, "sink.count") == [count, count + 1]
+
+
+def _rows(result, t, name):
+    return [value for time, value in zip(result.times, result.signals[name], strict=True) if time == t]
+
+
+@pytest.mark.parametrize("name", ["static", "dynamic"])
+def test_jumps_inside_fmus_have_both_rows(name, tmp_path, capsys):
+    """The agents as FMI 2.0, which have jumped when their steps end, beside those of 3.0: at jumps both sides count."""
+    table = tmp_path / "run.csv"
+    for fmi, option in (("3.0", "--output-file"), ("2.0", "--reference-file")):
+        assert main(["cosim", f"paper-a-{name}", "--fmi", fmi, option, str(table)]) == 0
+    assert "agent1.broadcast differs from run.csv by" in capsys.readouterr().out
 
 
 def test_a_ball_on_an_oscillating_table():
