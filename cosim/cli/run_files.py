@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -104,7 +105,13 @@ class RunFiles:
 
 def _write_table(path: Path, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> None:
     numbers = {name: np.array(values) for name, values in signals.items()}
-    numbers = {name: column for name, column in numbers.items() if column.dtype.kind in "biuf"}
+    others = [name for name, column in numbers.items() if column.dtype.kind not in "biuf"]
+    numbers = {name: column for name, column in numbers.items() if name not in others}
+    if others:
+        print(
+            f"hybrid-fmu: {path} holds numbers alone, and is without {', '.join(others)}: .csv has all.",
+            file=sys.stderr,
+        )
     write_columns(path, {"time": np.array(times), **numbers}, {"time": "s"})
 
 

@@ -152,6 +152,15 @@ def test_what_there_is_stays_when_an_fmu_fails(stranger, tmp_path, capsys):
     assert columns(out)["time"] == ["0.0"]
 
 
+def test_outputs_that_a_file_of_numbers_does_not_hold_are_named(echo, tmp_path, capsys):
+    table = tmp_path / "run.npz"
+    assert main(["cosim", str(echo), "--output-file", str(table)]) == 0
+    assert "run.npz holds numbers alone, and is without string_out, binary_out: .csv has all" in capsys.readouterr().err
+    with np.load(table) as columns_of_numbers:
+        assert {"x", "int64_out"} <= set(columns_of_numbers)
+        assert "string_out" not in columns_of_numbers
+
+
 def test_a_run_is_compared_with_a_table(echo, tmp_path, capsys):
     out = tmp_path / "out.csv"
     assert main(["cosim", str(echo), "--output-file", str(out)]) == 0
