@@ -43,8 +43,10 @@ def measured_by_tex() -> Iterator[None]:
     with plt.rc_context({"pgf.texsystem": system}):
         try:
             yield
-        except (LatexError, RuntimeError) as error:
-            why = str(error).splitlines()[0].rstrip(".:")
+        except (LatexError, RuntimeError, BrokenPipeError) as error:
+            # One that ends before it has read its preamble has said nothing that matplotlib would pass on.
+            broken = isinstance(error, BrokenPipeError)
+            why = "nothing, and ends at once" if broken else str(error).splitlines()[0].rstrip(".:")
             raise DataError(
                 f"a figure as PGF cannot be written, since {system} says: {why}. Remedy: install LaTeX's package pgf "
                 "with its recommended ones, or leave pgf out."
