@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
 import hybrid_model as hm
@@ -44,6 +46,17 @@ class ContinuousIntegrator(Integrator):
 
     broadcast = hm.Input(0.0, description="state of the agent itself")
     neighbours = hm.Input(0.0, shape="degree", description="states of the neighbours")
+
+
+@cache
+def of_size(motion: type[Integrator], size: float) -> type[Integrator]:
+    """Return the motion with `size` as the nominal value of the state.
+
+    An agent that starts at zero, or at what rounding has left of it, among neighbours on both sides, has rates that are
+    rounding as well; by itself it would take them for the sizes that there are.
+    """
+    state = hm.State(0.0, description="state of the agent", output=True, nominal=size)
+    return type(motion.__name__, (motion,), {"__doc__": motion.__doc__, "__module__": motion.__module__, "x": state})
 
 
 class ContinuousBroadcast(hm.HybridAutomaton):

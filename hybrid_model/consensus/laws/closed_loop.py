@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import hybrid_model as hm
-from hybrid_model.consensus.laws.agents import ContinuousIntegrator, Integrator, agent
+from hybrid_model.consensus.laws.agents import ContinuousIntegrator, Integrator, agent, of_size
 from hybrid_model.consensus.laws.channels import LossyChannel, link_seeds
 from hybrid_model.consensus.laws.event_generators import Surroundings, event_generator
 from hybrid_model.consensus.messages import ScenarioError
@@ -135,7 +135,7 @@ def agent_recipes(scenario: Scenario, number: int, motion: type[hm.HybridAutomat
     initial, gain = scenario.network.initial[number - 1], scenario.network.gain
     waveforms = tuple(scenario.weights.waveforms[k] for k in edges)
     trigger, switching = scenario.trigger, scenario.switching
-    moves = motion or (ContinuousIntegrator if trigger.kind is TriggerKind.CONTINUOUS else Integrator)
+    moves = motion or _motion(scenario)
     around = Surroundings(edges, waveforms, switching, gain)
     # Thresholds on the error alone know nothing of what is around.
     known = (edges, waveforms, switching, gain) if trigger.kind in _KNOW_MORE else ()
@@ -149,6 +149,12 @@ def agent_recipes(scenario: Scenario, number: int, motion: type[hm.HybridAutomat
         "switching": ((switching, edges), lambda: switching.automaton(edges)),
         "channel": ((channel, edges), lambda: _channel(scenario, number, edges)),
     }
+
+
+def _motion(scenario: Scenario) -> type[hm.HybridAutomaton]:
+    kind = ContinuousIntegrator if scenario.trigger.kind is TriggerKind.CONTINUOUS else Integrator
+    size = scenario.network.size_beside_zeros
+    return kind if size is None else of_size(kind, size)
 
 
 def scenario_agent(scenario: Scenario, number: int, motion: type[hm.HybridAutomaton] | None = None) -> hm.Composition:

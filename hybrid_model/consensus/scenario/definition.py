@@ -24,6 +24,10 @@ class Underlying(enum.Enum):
     COMPLETE = "complete"
 
 
+_NOTHING = 1e-9
+"""Share of the largest initial state below which one may be what rounding has left of zero."""
+
+
 @dataclass(frozen=True)
 class Network:
     """Agents, the edges that can carry weight, the initial states and the gain.
@@ -68,6 +72,14 @@ class Network:
         for agent, value in enumerate(self.initial, start=1):
             _require_finite(f"[network] initial[{agent}]", value)
         _require_positive("[network] gain", self.gain)
+
+    @cached_property
+    def size_beside_zeros(self) -> float | None:
+        """Size of the initial states, a power of ten, if one of them is zero beside the others or nearly so."""
+        sizes = [abs(value) for value in self.initial]
+        largest = max(sizes)
+        # In powers of ten, so that scenarios with other start values have the same agents.
+        return 10.0 ** math.ceil(math.log10(largest)) if min(sizes) < _NOTHING * largest else None
 
     @cached_property
     def underlying_edges(self) -> tuple[Edge, ...]:

@@ -179,3 +179,25 @@ def _entries():
         "network": {"agents": 2, "edges": [[1, 2]], "initial": [1.0, -1.0]},
         "weights": {"kind": "constant", "value": 1.0},
     }
+
+
+@pytest.mark.parametrize("agents", [4, 8, 60])
+def test_agents_that_start_at_what_rounding_leaves_of_zero_run_on(agents):
+    """Between neighbours on both sides of zero their rates are rounding too, which must not be taken for their size."""
+    scenario = read_scenario(
+        {
+            "name": "cosine",
+            "stop_time": 8.0,
+            "network": {"agents": agents, "graph": "ring", "initial": "cos(2*pi*i/n)"},
+            "weights": {"kind": "sine", "mean": 1.0, "depth": 0.5, "rate": 2.0},
+            "trigger": {"kind": "dynamic", "threshold": 0.2, "decay": 0.2},
+        }
+    )
+    assert 0.0 < min(map(abs, scenario.network.initial)) < 1e-15
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
+    run = hm.simulate_network(agent_network(scenario), scenario.stop_time)
+    assert run.stop is arc.stop is hm.Stop.HORIZON
+    times = np.sort(np.concatenate(run_report(scenario, arc).event_times))
+    assert len(times) > 20
+    # Agents that are mirror images broadcast together, in an order that rounding decides.
+    np.testing.assert_allclose(np.sort(run.events.t), times, rtol=0, atol=1e-8)
