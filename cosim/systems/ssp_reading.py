@@ -11,7 +11,6 @@ from cosim.sources import Linear, Source
 from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
 from fmu.archives.checks import LIMITS
 from fmu.archives.reading import Archive, ArchiveError
-from fmu.importer.loading import read_description
 from fmu.importer.plain_xml import PlainXmlError, parse_plain
 from fmu.importer.temporary_folders import temporary_folder
 
@@ -163,6 +162,9 @@ class _Reading:
         told = {variable: unit for (place, variable), unit in self._units.items() if place == name}
         if not told:
             return
+        # fmpy is imported by whoever reads a system, not by whoever asks for the versions there are.
+        from fmu.importer.loading import read_description
+
         try:
             description = read_description(str(file), validate=False)
         except Exception:  # noqa: BLE001 - whatever fmpy raises, the slave says what is wrong
