@@ -89,29 +89,21 @@ class JoinedBlocks:
         StiffPart
             If a flow needs derivatives that are not there.
         """
-        advance = NetworkAdvance.GOING
-        while self._watch and advance is NetworkAdvance.GOING:
-            advance = self._network.next_instant(limit)
-            if advance is NetworkAdvance.GOING:
-                self._watch(self.t)
-                if not self._network.handle():
-                    advance = self._network.end.how
-                self._take()
-                self._watch(self.t)
-        if advance in (NetworkAdvance.GOING, NetworkAdvance.REACHED):
-            advance = NetworkAdvance.GOING
-            while advance is NetworkAdvance.GOING:
-                advance = self._network.advance(limit, EVENTS_AT_ONCE)
-                self._take()
-        self._note(advance)
+        self._go_on(limit, self._network.advance)
 
     def approach(self, limit: float) -> None:
         """Handle all events before `limit` in s; those there come with `handle_events`. See `Scheduler.approach`."""
+        self._go_on(limit, self._network.approach, leaves_last=True)
+
+    def _go_on(
+        self, limit: float, to_limit: Callable[[float, int], NetworkAdvance], *, leaves_last: bool = False
+    ) -> None:
+        """Go from instant to instant if somebody watches, and then to `limit` in s; events there may be left."""
         advance = NetworkAdvance.GOING
         while self._watch and advance is NetworkAdvance.GOING:
             advance = self._network.next_instant(limit)
             if advance is NetworkAdvance.GOING:
-                if limit - self.t <= one_instant(limit, self._t_start, self._t_start):
+                if leaves_last and limit - self.t <= one_instant(limit, self._t_start, self._t_start):
                     return
                 self._watch(self.t)
                 if not self._network.handle():
@@ -121,7 +113,7 @@ class JoinedBlocks:
         if advance in (NetworkAdvance.GOING, NetworkAdvance.REACHED):
             advance = NetworkAdvance.GOING
             while advance is NetworkAdvance.GOING:
-                advance = self._network.approach(limit, EVENTS_AT_ONCE)
+                advance = to_limit(limit, EVENTS_AT_ONCE)
                 self._take()
         self._note(advance)
 
