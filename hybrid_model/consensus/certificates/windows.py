@@ -12,11 +12,10 @@ from hybrid_model.consensus.excitation.persistence import Signal, excitation_hor
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.scenario.definition import Scenario
 
-__all__ = ["BestWindow", "RateForm", "best_window", "rate_over_window", "search_window", "shortest_exciting_window"]
+__all__ = ["BestWindow", "RateForm", "best_window", "rate_over_window", "search_window"]
 
 _GRID = 48
 _REFINED = 3
-_ZERO = 1e-12
 _MULTIPLES = 12
 
 
@@ -154,37 +153,3 @@ def search_window(
         if -float(refined.fun) > best.rate:
             best = BestWindow(float(refined.x), -float(refined.fun))
     return best
-
-
-def shortest_exciting_window(
-    scenario: Scenario, signal: Signal, partition: TreePartition | None = None, *, longest: float | None = None
-) -> float | None:
-    """Infimum of the windows [s] over which a signal is persistently exciting; None if even the longest is not.
-
-    Parameters
-    ----------
-    scenario, signal, partition
-        As in `scenario_excitation`.
-    longest : float, optional
-        Longest window [s] to try; by default three periods, without a period the run.
-
-    Notes
-    -----
-    mu1 does not fall with the window, so the infimum is found by bisection, to a share of 1e-6. A mu1 below 1e-12 mu2
-    counts as zero; a weight that begins like the square of time reaches that after about 1e-4 of its width.
-    """
-    period = scenario.edge_weights.period
-    factor = signal_factor(scenario, signal, partition)
-    high = longest if longest is not None else (3 * period if period else scenario.stop_time)
-
-    def is_exciting(window: float) -> bool:
-        extremes = window_extremes(factor, scenario.edge_weights, window, excitation_horizon(scenario))
-        return extremes.mu1 > _ZERO * extremes.mu2
-
-    if not is_exciting(high):
-        return None
-    low = 0.0
-    while high - low > 1e-6 * high:
-        middle = (low + high) / 2
-        low, high = (low, middle) if is_exciting(middle) else (middle, high)
-    return high

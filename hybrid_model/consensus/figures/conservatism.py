@@ -17,8 +17,7 @@ from hybrid_model.consensus.figures.details import (
     plot_gaps_against_bounds,
 )
 from hybrid_model.consensus.figures.run import plot_edge_norm, plot_states
-from hybrid_model.consensus.figures.style import COLUMN, VIOLATED, height_of, in_column, save_figures
-from hybrid_model.consensus.figures.sweeps import is_drawable
+from hybrid_model.consensus.figures.style import COLUMN, VIOLATED, height_of, in_column, is_drawable, save_figures
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.plots import COLORS, new_axes
 from hybrid_model.record.arc import HybridArc

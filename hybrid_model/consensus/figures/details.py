@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -16,10 +16,9 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from hybrid_model.consensus.figures.run import plot_broadcasts, plot_error_against_threshold
-from hybrid_model.consensus.figures.style import COLUMN, DASHES, MARKER, VIOLATED, height_of, legend_above, over_time
+from hybrid_model.consensus.figures.style import COLUMN, DASHES, MARKER, VIOLATED, height_of, over_time
 from hybrid_model.consensus.laws.closed_loop import agent_name, edges_of
 from hybrid_model.consensus.runs.communication import gap_statistics
-from hybrid_model.consensus.runs.metrics import States, disagreement
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.plots import COLORS, new_axes, plot_inter_event_times
 from hybrid_model.plots.events import LEGEND_ROWS
@@ -28,8 +27,6 @@ from hybrid_model.record.arc import HybridArc
 __all__ = [
     "plot_all_errors",
     "plot_broadcasts_and_weights",
-    "plot_disagreement",
-    "plot_gap_histogram",
     "plot_gaps_against_bounds",
 ]
 
@@ -177,7 +174,7 @@ def plot_gaps_against_bounds(
         ax.plot([], [], color="0.3", marker="o", markersize=3, linestyle="none", label=f"{len(rows)} agents")
     smallest = gap_statistics(event_times).min
     lowest = smallest if smallest is not None else 1.0
-    for (name, bound), style in zip(bounds.items(), _cycled(len(bounds)), strict=True):
+    for (name, bound), style in zip(bounds.items(), itertools.cycle(DASHES), strict=False):
         if bound is None or not 0 < bound < math.inf:
             ax.plot([], [], linestyle="none", label=f"no {name} bound")
             continue
@@ -190,73 +187,3 @@ def plot_gaps_against_bounds(
     over_time(ax, scenario)
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, handlelength=1.8)
     return ax
-
-
-def plot_gap_histogram(
-    event_times: Sequence[npt.ArrayLike], bins: int = 20, ax: Axes | None = None, **options: Any
-) -> Axes:
-    """Draw how often which time between broadcasts occurs, in classes a constant factor apart.
-
-    Parameters
-    ----------
-    event_times : sequence of array_like
-        Times [s] of each agent's broadcasts.
-    bins : int
-        Number of classes.
-    ax : Axes, optional
-        Where to draw.
-    **options
-        As in ``Axes.stairs``.
-
-    Raises
-    ------
-    ValueError
-        If there are no gaps.
-    """
-    ax = new_axes(ax)
-    found = gap_statistics(event_times)
-    counts, limits = found.histogram(bins)
-    look: dict[str, Any] = {"fill": True, "color": COLORS[0], "alpha": 0.6} | options
-    ax.stairs(counts, limits, **look)
-    ax.set_xscale("log")
-    median = found.quantiles((0.5,))[0.5]
-    ax.axvline(median, color="k", linestyle=DASHES[0], linewidth=0.9, label=f"median {median:.3g} s")
-    ax.set_xlabel("time between broadcasts of an agent (s)")
-    ax.set_ylabel("number")
-    ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    legend_above(ax)
-    return ax
-
-
-def plot_disagreement(
-    scenario: Scenario, runs: Mapping[str, States], level: float | None = None, ax: Axes | None = None
-) -> Axes:
-    """Draw ``||x - mean(x) 1||`` of several runs of one network over time, on a logarithmic axis.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        What ran: its stop time counts.
-    runs : mapping
-        Name -> states, from `hybrid_model.consensus.runs.metrics.run_states` or `PeriodicRun.at`.
-    level : float, optional
-        Of the settling time, drawn as a line.
-    ax : Axes, optional
-        Where to draw.
-    """
-    ax = new_axes(ax)
-    times = np.linspace(0.0, scenario.stop_time, 1001)
-    for (name, states), style in zip(runs.items(), ["solid", *_cycled(len(runs))], strict=False):
-        values = disagreement(states(times))
-        ax.plot(times, np.where(values > 0, values, math.nan), linestyle=style, label=name)
-    if level is not None:
-        ax.axhline(level, color="0.5", linewidth=0.7, zorder=0, label="settled")
-    ax.set_yscale("log")
-    over_time(ax, scenario)
-    ax.set_ylabel(r"disagreement $\|x - \bar{x}\mathbf{1}\|$")
-    legend_above(ax, handlelength=1.8)
-    return ax
-
-
-def _cycled(count: int) -> list[Any]:
-    return [DASHES[k % len(DASHES)] for k in range(count)]

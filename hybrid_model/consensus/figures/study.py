@@ -15,8 +15,7 @@ from matplotlib.ticker import LogFormatter, MaxNLocator
 from numpy.typing import NDArray
 
 from hybrid_model.consensus.certificates.forms import Form, Quantity
-from hybrid_model.consensus.figures.style import COLUMN, FORMS, save_figures
-from hybrid_model.consensus.figures.sweeps import is_drawable
+from hybrid_model.consensus.figures.style import COLUMN, FORMS, is_drawable, save_figures
 from hybrid_model.consensus.sweeps.axes import Seeds
 from hybrid_model.consensus.sweeps.errors import SweepError
 from hybrid_model.consensus.sweeps.study import METRICS

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 import matplotlib.pyplot as plt
 from matplotlib.axes import Axes
@@ -32,6 +32,7 @@ __all__ = [
     "agent_mark",
     "height_of",
     "in_column",
+    "is_drawable",
     "legend_above",
     "over_time",
     "require_formats",
@@ -58,6 +59,8 @@ FORMATS: dict[str, dict[str, None]] = {
 """Forms of figures -> what is not written into them, so that one run gives the same files each time."""
 LINES: tuple[Any, ...] = ("solid", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)))
 """Line styles of agents, one after the other."""
+_LARGEST = 1e100
+"""A bound that is larger has overflown, or is about to; an axis that shows it shows nothing else."""
 MARKS = "osD^v<>X"
 """Marks of agents, as many as there are colours."""
 VIOLATED = COLORS[1]
@@ -207,3 +210,8 @@ def _save(figure: Figure, path: Path, formats: Sequence[str]) -> list[Path]:
                 figure.savefig(file, metadata=FORMATS[name])
     plt.close(figure)
     return written
+
+
+def is_drawable(value: float | None) -> TypeGuard[float]:
+    """Whether a logarithmic axis can show a value."""
+    return value is not None and 0 < value < _LARGEST

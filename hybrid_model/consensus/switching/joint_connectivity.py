@@ -12,14 +12,7 @@ from hybrid_model.consensus.graphs.connectivity import is_connected
 from hybrid_model.consensus.graphs.undirected import Edge
 from hybrid_model.consensus.switching.base import Switching
 
-__all__ = ["joint_connectivity_window", "union_edges"]
-
-
-def union_edges(switching: Switching, t0: float, t1: float) -> tuple[int, ...]:
-    """Numbers, from 1, of the edges that are active during some part of the time from `t0` to `t1` [s]."""
-    cuts = [t0, *switching.breakpoints(t0, t1).tolist(), t1]
-    masks = [switching.active_at((a + b) / 2) for a, b in itertools.pairwise(cuts)]
-    return tuple(int(edge) + 1 for edge in np.flatnonzero(np.any(masks, axis=0)))
+__all__ = ["joint_connectivity_window"]
 
 
 def joint_connectivity_window(

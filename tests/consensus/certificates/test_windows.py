@@ -13,14 +13,12 @@ from hybrid_model.consensus.certificates.windows import (
     best_window,
     rate_over_window,
     search_window,
-    shortest_exciting_window,
 )
 from hybrid_model.consensus.exact.floquet import floquet_spectrum
 from hybrid_model.consensus.excitation.persistence import (
     Signal,
     scenario_excitation,
 )
-from hybrid_model.consensus.graphs.spanning_trees import TreePartition
 from hybrid_model.consensus.scenario.files import load_scenario
 
 
@@ -73,14 +71,3 @@ class TestBestWindow:
         with pytest.raises(ValueError, match="a shorter window always gives a better rate"):
             best_window(scenario, RateForm.VALID)
         assert best_window(scenario, RateForm.VALID, shortest=0.01, longest=1.0).window == 0.01
-
-    def test_shortest_exciting_windows_of_scenario_a(self):
-        # By hand: without a tree, the longest time that some edge of the second tree is off while it is switched on,
-        # pi/2 less the on-time of edge 4; along the first tree, edge 1 is off from pi/2 + pi/10 to 2 pi.
-        scenario = load_scenario("paper-a")
-        on_time = math.pi / 2 * (20 - 0.3 * math.pi) / 100
-        # The square of a sine begins flat: mu1 leaves its zero, 1e-12 mu2, some 1e-4 s later.
-        assert shortest_exciting_window(scenario, Signal.DISAGREEMENT) == pytest.approx(math.pi / 2 - on_time, abs=2e-4)
-        assert shortest_exciting_window(scenario, Signal.TREE_WEIGHTS) == pytest.approx(1.4 * math.pi, abs=2e-4)
-        tree = TreePartition(4, scenario.network.underlying_edges, (1, 2, 6))
-        assert shortest_exciting_window(scenario, Signal.TREE_WEIGHTS, tree) is None

@@ -2,38 +2,8 @@
 
 import numpy as np
 import pytest
-from drawn_axes import labels, line
 
-from hybrid_model.consensus.certificates.forms import Quantity
 from hybrid_model.consensus.figures.conservatism import plot_conservatism
-from hybrid_model.consensus.figures.sweeps import plot_against_parameter, plot_radius_against, plot_rate_against
-
-
-def test_forms_against_a_parameter_leave_gaps_where_they_do_not_exist(ax):
-    beta = [0.0, 0.1, 0.2]
-    plot_radius_against("beta", beta, {"exact": [1.0, 2.0, 3.0], "valid": [5.0, None, None], "printed": [None] * 3}, ax)
-    np.testing.assert_array_equal(line(ax, "exact").get_ydata(), [1.0, 2.0, 3.0])
-    np.testing.assert_array_equal(line(ax, "valid").get_ydata(), [5.0, np.nan, np.nan])
-    assert "no printed" in labels(ax)
-    assert ax.get_yscale() == "log"
-    assert ax.get_xlabel() == r"decay of the threshold $\beta$ (1/s)"
-
-
-def test_rate_against_beta_has_the_line_that_parts_slow_from_fast_thresholds(ax):
-    plot_rate_against("beta", [0.0, 0.3, 0.6], {"floquet": [0.47] * 3, "valid": [1e-3] * 3}, ax)
-    times, values = line(ax, r"$\beta$").get_data()
-    np.testing.assert_array_equal(times, values)
-
-
-def test_rate_against_c_has_no_such_line(ax):
-    plot_rate_against("c", [0.1, 0.3], {"floquet": [0.47] * 2}, ax)
-    assert labels(ax) == ["Floquet"]
-    assert ax.get_xlabel() == "threshold $c$"
-
-
-def test_wrong_number_of_values(ax):
-    with pytest.raises(ValueError, match="'valid' has 1 values for 2 of the parameter"):
-        plot_against_parameter([1.0, 2.0], {"valid": [1.0]}, name="c", quantity=Quantity.RATE, ax=ax)
 
 
 def test_conservatism_is_a_factor_and_violations_are_named(ax):
@@ -78,9 +48,3 @@ def test_what_is_observed_is_called_no_bound_however_far_the_factors_reach(ax):
     ax.figure.canvas.draw()
     assert all(text.get_window_extent().x0 > ax.transData.transform((1.0, 0.0))[0] for text in ax.texts)
     assert all(text.get_window_extent().x1 <= ax.figure.bbox.x1 for text in ax.texts)
-
-
-def test_a_bound_that_has_overflown_leaves_the_others_visible(ax):
-    plot_radius_against("beta", [0.0, 0.1], {"exact": [2.0, 3.0], "energy": [4.0, 7e305]}, ax)
-    np.testing.assert_array_equal(line(ax, "energy").get_ydata(), [4.0, np.nan])
-    assert ax.get_ylim()[1] < 10

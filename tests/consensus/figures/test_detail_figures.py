@@ -11,13 +11,9 @@ import hybrid_model as hm
 from hybrid_model.consensus.figures.details import (
     plot_all_errors,
     plot_broadcasts_and_weights,
-    plot_disagreement,
-    plot_gap_histogram,
     plot_gaps_against_bounds,
 )
 from hybrid_model.consensus.laws.closed_loop import closed_loop, edges_of
-from hybrid_model.consensus.runs.metrics import run_states
-from hybrid_model.consensus.runs.periodic_run import periodic_run
 from hybrid_model.consensus.runs.report import run_report
 from hybrid_model.consensus.scenario.files import load_scenario
 
@@ -76,24 +72,3 @@ def test_gaps_and_bounds(run, ax):
     low, high = ax.get_ylim()
     assert low < 1e-6
     assert high > max(np.max(np.diff(row), initial=0.0) for row in times)
-
-
-def test_disagreement_of_runs_side_by_side(run, ax):
-    scenario, arc, _ = run
-    periodic = periodic_run(scenario, 0.5)
-    plot_disagreement(scenario, {"static": run_states(scenario, arc), "periodic": periodic.at}, 0.1, ax)
-    assert labels(ax) == ["static", "periodic", "settled"]
-    start = np.std([1.0, 2.0, 0.3, 0.4]) * 2  # of four agents: sqrt(4) times the standard deviation
-    for name in ("static", "periodic"):
-        assert line(ax, name).get_ydata()[0] == pytest.approx(start)
-    last = periodic.at(np.array([scenario.stop_time]))[:, 0]
-    assert line(ax, "periodic").get_ydata()[-1] == pytest.approx(np.linalg.norm(last - last.mean()))
-
-
-def test_histogram_counts_every_gap(run, ax):
-    _, _, times = run
-    plot_gap_histogram(times, 8, ax)
-    values = ax.patches[0].get_data().values
-    assert values.sum() == sum(max(0, len(row) - 1) for row in times)
-    gaps = np.concatenate([np.diff(row) for row in times])
-    assert labels(ax) == [f"median {np.median(gaps):.3g} s"]
