@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from graphlib import CycleError, TopologicalSorter
 
 from cosim.errors import CosimError
@@ -34,15 +34,17 @@ def refuse_loops(system: System) -> None:
     flows = [connection for connection in system.connections if system.is_continuous(connection)]
     found = _sorted(flows, _leads_by_description(system))
     if isinstance(found, list):
-        raise CosimError(
-            f"{_told(found)} depend on each other at once, in a loop. Break it by a state, or have it iterated."
-        )
+        loop = _listed(list(map(str, found)))
+        raise CosimError(f"{loop} depend on each other at once, in a loop. Break it by a state, or have it iterated.")
 
 
-def told_loop(unsettled: Sequence[Connection]) -> str:
-    """Return words for the loop among connections whose signals do not settle."""
-    found = _sorted(unsettled, lambda one, other: one.target == other.source)
-    return f"{_told(found)} form a loop" if isinstance(found, list) else f"{unsettled[0]} and others form a loop"
+def told_loop(unsettled: Mapping[Connection, str]) -> str:
+    """Return words for the loop among connections whose signals do not settle, each with what is said of it."""
+    found = _sorted(list(unsettled), lambda one, other: one.target == other.source)
+    if isinstance(found, list):
+        return f"{_listed([f'{wire}{unsettled[wire]}' for wire in found])} form a loop"
+    first = next(iter(unsettled))
+    return f"{first}{unsettled[first]} and others form a loop"
 
 
 def _leads_by_description(system: System) -> Leads:
@@ -67,6 +69,5 @@ def _sorted(connections: Sequence[Connection], leads: Leads) -> tuple[Connection
         return loop
 
 
-def _told(loop: Sequence[Connection]) -> str:
-    names = list(map(str, loop))
+def _listed(names: Sequence[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]

@@ -8,6 +8,7 @@ from typing import Any
 
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Given
+from cosim.masters.loops import Settling
 from cosim.masters.start import outputs, require_times, sample_end, start_slaves
 from cosim.masters.treatments import by_fixed_steps
 from cosim.result import CosimResult, Watch
@@ -56,7 +57,8 @@ def run_fixed_step(
         Told of the run after each row; see `CosimResult.watch`.
     order : {"jacobi", "gauss-seidel"}
         Whether all slaves step with the signals of the last communication point, or each with what those before it in
-        the system have come to in this step.
+        the system have come to in this step. In a system with `loop_iterations` signals then go round loops until they
+        settle, with the inputs from outside of that time, before they are kept.
 
     Returns
     -------
@@ -95,11 +97,15 @@ def run_fixed_step(
             if not step_all(result, t_next):
                 sample_end(system, result, result.t, record)
                 break
-            recorded = points.read()
+            if system.loop_iterations:
+                changes.arrive(t_next)
+                recorded = points.settle(t_next)
+            else:
+                recorded = points.read()
             if k % every == 0 or k == count:
                 result.keep(t_next, record, recorded)
-            points.exchange()
-            if inputs:
+            if not system.loop_iterations:
+                points.exchange()
                 changes.arrive(t_next)
         result.final = outputs(system)
     finally:
@@ -142,6 +148,7 @@ class _Points:
     """The signals of a system that has been started, at the communication points."""
 
     def __init__(self, system: System, record: Sequence[str]) -> None:
+        self._system = system
         # One read for both: each costs a call of each FMU.
         self._read = system.reader([*record, *(f"{c.source}.{c.output}" for c in system.connections)])
         self._recorded = len(record)
@@ -156,13 +163,28 @@ class _Points:
         if not self._inputs:
             return values
         self._values = values[self._recorded :]
+        for k, carried in self._converted:
+            self._values[k] = carried(self._values[k])
         return values[: self._recorded]
+
+    def settle(self, t: float) -> list[Any]:
+        """Carry signals round loops at `t` in s until they stand; return the recorded, which solve the loops.
+
+        Raises
+        ------
+        CosimError
+            If they do not settle.
+        """
+        settling, recorded = Settling(self._system, self._system.connections, t), self.read()
+        while True:
+            self.exchange()
+            recorded = self.read()
+            if settling.is_done(self._sent, self._values):
+                return recorded
 
     def exchange(self) -> None:
         """Write what was read to the inputs; one that holds its value already is left alone."""
         values = self._values
-        for k, carried in self._converted:
-            values[k] = carried(values[k])
         if values == self._sent:  # as in a system without connections
             return
         for (slave, name), value, before in zip(self._inputs, values, self._sent, strict=True):

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cosim.errors import CosimError
-from cosim.feedthrough import told_loop
 from cosim.masters.changes import Changes
+from cosim.masters.loops import Settling
 from cosim.masters.signal_history import SignalHistory
 from cosim.slave import Port, Slave
 from cosim.system import System
@@ -130,25 +130,20 @@ class MacroSteps:
             If they do not settle: outputs depend on inputs at once, in a loop.
         """
         self._changes.follow(t)
-        before: list[float] | None = None
-        system = self._system
-        for _ in range(system.most_rounds):
-            values = [c.carried(v) for c, v in zip(self._flows, self._read(), strict=True)]
-            if before is not None and all(map(system.settled, values, before)):
-                return values
-            for k, (connection, value) in enumerate(zip(self._flows, values, strict=True)):
-                if before is None or before[k] != value:
-                    system.slaves[connection.target].set(connection.input, value)
+        settling, before = Settling(self._system, self._flows, t), self._carried()
+        self._send(before, [None] * len(before))
+        while not settling.is_done(before, values := self._carried()):
+            self._send(values, before)
             before = values
-        assert before is not None
-        changed = [c for c, a, b in zip(self._flows, before, self._carried(), strict=True) if a != b]
-        raise CosimError(
-            f"the signals at t = {t:.9g} s do not settle: {told_loop(changed)} in which they depend on each other at "
-            "once. Break it by a state, or have it iterated."
-        )
+        return values
 
     def _carried(self) -> list[float]:
         return [c.carried(v) for c, v in zip(self._flows, self._read(), strict=True)]
+
+    def _send(self, values: Sequence[float], before: Sequence[float | None]) -> None:
+        for connection, value, old in zip(self._flows, values, before, strict=True):
+            if value != old:
+                self._system.slaves[connection.target].set(connection.input, value)
 
     def remember(self) -> None:
         """Note what the slaves without event mode say at events, to see a change."""

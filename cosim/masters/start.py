@@ -6,10 +6,12 @@ import contextlib
 import gc
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from cosim.errors import CosimError
-from cosim.feedthrough import in_order, told_loop
+from cosim.feedthrough import in_order
 from cosim.masters.changes import Changes
+from cosim.masters.loops import Settling
 from cosim.result import CosimResult
 from cosim.system import Connection, System
 from hybrid_model.declare.real_numbers import is_real
@@ -65,27 +67,31 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool 
     changes.set_start_values()
     known: dict[tuple[str, str], float] = {}
     connections = in_order(system)
-    for _ in range(system.most_rounds):
-        changed = [c for c in connections if transfer_start(system, c, known)]
-        if not changed:
+    settling, before = Settling(system, connections), list[Any]()
+    while True:
+        for connection in connections:
+            transfer_start(system, connection, known)
+        values = [known[_end(c)] for c in connections]
+        if settling.is_done(before or [None] * len(values), values):
             break
-    else:
-        raise CosimError(
-            f"the start values do not settle: {told_loop(changed)}. Break it by a state, or have it iterated."
-        )
+        before = values
     for slave in system.slaves.values():
         slave.begin()
 
 
 def transfer_start(system: System, connection: Connection, known: dict[tuple[str, str], float]) -> bool:
     """Transfer one start value; return whether it was news to the input."""
-    target, input_, source, output = connection.target, connection.input, connection.source, connection.output
-    value = connection.carried(system.slaves[source].get(output))
-    if (target, input_) in known and system.settled(value, known[target, input_]):
+    at = _end(connection)
+    value = connection.carried(system.slaves[connection.source].get(connection.output))
+    if at in known and system.settled(value, known[at]):
         return False
-    known[target, input_] = value
-    system.slaves[target].set(input_, value)
+    known[at] = value
+    system.slaves[connection.target].set(connection.input, value)
     return True
+
+
+def _end(connection: Connection) -> tuple[str, str]:
+    return connection.target, connection.input
 
 
 def sample(system: System, result: CosimResult, t: float, names: Sequence[str]) -> None:
