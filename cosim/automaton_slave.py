@@ -56,7 +56,13 @@ class AutomatonSlave(Slave):
             array = "" if elements == [variable.name] else variable.name
             ports[variable.kind] += [
                 Port(
-                    name, variable.unit, discrete, whole=variable.integer, array=array, measure=_measure(variable.unit)
+                    name,
+                    variable.unit,
+                    discrete,
+                    whole=variable.integer,
+                    array=array,
+                    measure=_measure(variable.unit),
+                    nominal=variable.nominal or 0.0,
                 )
                 for name in elements
             ]

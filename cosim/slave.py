@@ -31,6 +31,8 @@ class Port:
         Name of the array that it is an element of, if it is one.
     measure : Measure or None
         What its unit is in SI units, as far as the block says.
+    nominal : float
+        Its usual size, as far as the block says; else 0.
     """
 
     name: str
@@ -40,6 +42,7 @@ class Port:
     whole: bool = False
     array: str = ""
     measure: Measure | None = None
+    nominal: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import Any
@@ -104,8 +105,18 @@ class FmuVariables:
         if measure is not None and relative:  # a difference: 20 degC are 20 K
             measure = replace(measure, offset=0.0)
         kind, whole = KINDS.get(variable.type, "number"), variable.type in INTEGERS
+        nominal = _nominal(variable.nominal or (declared.nominal if declared else None))
         for name in self._names(variable):
-            yield Port(name, unit, discrete, kind, whole, array, measure)
+            yield Port(name, unit, discrete, kind, whole, array, measure, nominal)
+
+
+def _nominal(text: str | None) -> float:
+    """Return the size that a description says, which may be any text where it was not held against the schema."""
+    try:
+        size = abs(float(text or 0.0))
+    except ValueError:
+        return 0.0
+    return size if math.isfinite(size) else 0.0
 
 
 def _measure(base: Any) -> Measure | None:

@@ -13,12 +13,12 @@ from cosim.feedthrough import refuse_loops
 from cosim.masters.changes import Changes, Given
 from cosim.masters.event_iteration import iterate_events
 from cosim.masters.macro_step import MacroSteps, Outcome, States
+from cosim.masters.signal_sizes import SignalSizes
 from cosim.masters.start import MOST_STEPS, outputs, require_times, sample_change, sample_end, start_slaves
 from cosim.masters.treatments import with_rollback
 from cosim.replayed_slave import ReplayedSlave
 from cosim.result import CosimResult, Watch
 from cosim.system import System, require_system
-from hybrid_model.declare.variables import FloatArray
 from hybrid_model.schedule.blocks import Termination
 from hybrid_model.schedule.scheduler import Event
 
@@ -34,8 +34,8 @@ FIRST = 1e-3
 """First macro step, as a part of the run."""
 SAFETY, LEAST, MOST, ORDER = 0.9, 0.2, 5.0, 3
 """Of the step size control: factors, and the order of the local error."""
-SURPRISE, TINY = 1e4, 1e-300
-"""How far signals may be from what was expected of them, in tolerances; a size above zero."""
+SURPRISE = 1e4
+"""How far signals may be from what was expected of them, in tolerances."""
 _QUIET, _ROUNDING = 2, 1e-12
 
 
@@ -67,7 +67,8 @@ def run_error_controlled(
     t_stop, t_start : float
         Times in s.
     tolerance : float
-        Error of each macro step, as a part of the largest value that each signal has had.
+        Error of each macro step, as a part of the largest value that each signal has had, and at least of a hundredth
+        of its nominal value, where it declares one.
     output_interval : float, optional
         Record all outputs at multiples of this time in s; default: only at the end.
     record_events : bool
@@ -148,8 +149,7 @@ class _Run:
         length = span[1] - span[0]
         self._resolution = max(RESOLUTION * length, 16.0 * math.ulp(max(abs(span[0]), abs(span[1]))))
         self._h = FIRST * length
-        self._largest: FloatArray = np.zeros(0)
-        self._widest: FloatArray = np.zeros(0)
+        self._sizes, self._widths = SignalSizes((), ()), SignalSizes((), ())
         self._at_one_time = 0
         self._until, self._quiet = math.inf, _QUIET
         self.ended: tuple[str, float, Termination] | None = None
@@ -165,8 +165,8 @@ class _Run:
         first = [name for name, slave in slaves.items() if slave.stops_after_events]
         self.ended = iterate_events(self._system, self._result, t, lambda: first, macro.settle, entered=True)
         self._go_on(t)
-        self._largest = np.abs(np.array(self.macro.observe(), dtype=np.float64))
-        self._widest = np.abs(self.macro.history.last)
+        self._sizes = SignalSizes(macro.nominal_outputs, macro.observe())
+        self._widths = SignalSizes(macro.nominal_signals, macro.history.last)
 
     def advance_to(self, limit: float) -> None:
         """Go on to `limit` in s, or to the end of the run."""
@@ -233,18 +233,20 @@ class _Run:
     def _is_accurate(self, whole: list[float], end: float, values: list[float], h: float) -> bool:
         """Return whether a step in two halves is accurate, and choose the length of the next one."""
         halves, signals = np.array(self.macro.observe(), dtype=np.float64), np.array(values, dtype=np.float64)
-        largest = np.maximum(self._largest, np.abs(halves))
-        self._widest = np.maximum(self._widest, np.abs(signals))
         # Of second order: the error of the halves is a third of the difference.
-        error = np.abs(np.array(whole) - halves) / (3.0 * self._tolerance * np.maximum(largest, TINY))
+        error = np.abs(np.array(whole) - halves) / (3.0 * self._tolerance * self._sizes.beside(halves))
         # A signal that has jumped on the way is far from what was expected, whoever has felt it.
-        surprise = np.abs(self.macro.history.at(end) - signals) / np.maximum(self._widest, TINY)
+        surprise = np.abs(self.macro.history.at(end) - signals) / self._widths.beside(signals)
         worst = float(max(np.max(error, initial=0.0), np.max(surprise, initial=0.0) / (SURPRISE * self._tolerance)))
         factor = MOST if worst == 0.0 else SAFETY * worst ** (-1.0 / ORDER)
         if worst > 1.0:
             self._h = h * min(max(factor, LEAST), 1.0)
+            self._sizes.foresee(end, halves)
+            self._widths.foresee(end, signals)
             return False
-        self._largest, self._quiet = largest, self._quiet + 1
+        self._sizes.take(end, halves)
+        self._widths.take(end, signals)
+        self._quiet += 1
         if self._quiet > _QUIET:
             self._h = max(self._h if h < self._h else 0.0, h * min(max(factor, LEAST), MOST))
         return True
@@ -252,7 +254,7 @@ class _Run:
     def _jumped(self, before: list[float]) -> set[str]:
         """Return the slaves without event mode whose outputs are others after a step of no length to speak of."""
         change = np.abs(np.array(self.macro.observe()) - np.array(before))
-        jumps = change > self._tolerance * np.maximum(self._largest, 1e-300)
+        jumps = change > self._tolerance * self._sizes.beside(np.zeros_like(change))
         names = {self.macro.owners[k] for k in np.flatnonzero(jumps)}
         return {name for name in names if not self._system.slaves[name].has_event_mode}
 

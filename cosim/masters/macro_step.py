@@ -82,6 +82,8 @@ class MacroSteps:
         Returns all outputs that change along flows: what the accuracy is held against.
     owners : list of str
         Whose they are.
+    nominal_outputs, nominal_signals : list of float
+        Nominal values of what `observe` returns, and of what is in `history`; 0 where there is none.
     meet_at_events : bool
         Whether all slaves say where their events are, and nothing else that they exchange changes: any step will do.
     steps : int
@@ -107,7 +109,11 @@ class MacroSteps:
         names = [name for name in system.output_names if _is_flowing_number(system, name)]
         self.observe: Callable[[], list[float]] = system.reader(names)
         self.owners = [system.output(name)[0].name for name in names]
-        self._alone = system.reader([name for name in names if not system.output(name)[0].has_event_mode])
+        alone = [name for name in names if not system.output(name)[0].has_event_mode]
+        self._alone = system.reader(alone)
+        self.nominal_outputs = [_port(system, name).nominal for name in names]
+        self.nominal_signals = [abs(c.factor) * _port(system, f"{c.source}.{c.output}").nominal for c in self._flows]
+        self.nominal_signals += [_port(system, name).nominal for name in alone]
         self._known: list[Any] = []
         self._at = dict.fromkeys(system.slaves, t)
         self.meet_at_events = not self._fed and all(
@@ -270,8 +276,12 @@ def _differ(before: Sequence[Any], after: Sequence[Any]) -> bool:
 
 
 def _is_flowing_number(system: System, name: str) -> bool:
+    return _flows(_port(system, name))
+
+
+def _port(system: System, name: str) -> Port:
     slave, port = system.output(name)
-    return _flows(slave.outputs[port])
+    return slave.outputs[port]
 
 
 def _flows(output: Port) -> bool:
