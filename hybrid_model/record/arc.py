@@ -105,7 +105,16 @@ class HybridArc:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a variable's samples, shape (n, *shape): a state, input, parameter or output, or ``v[1]`` of them."""
-        return self._read.column(name, self.t, sampled_states(self._flows), held_in(self._flows, self._numbers))
+        shape, part = self.variable(name).shape, self._read.part(name)
+        if part is None:
+            states, held = sampled_states(self._flows), held_in(self._flows, self._numbers)
+            return self._read.column(name, self.t, states, held)
+        # Of a large network one state is read at the cost of one, not of all.
+        if self.variable(name).kind is Kind.DISCRETE:
+            values = held_in(self._flows, self._numbers, part)
+        else:
+            values = sampled_states(self._flows, part)
+        return values.reshape(len(self.t), *shape)
 
     def variable(self, name: str) -> Variable:
         """Return the declaration of a variable: its unit, description, shape.
@@ -151,9 +160,16 @@ class HybridArc:
             times, counts = np.broadcast_arrays(times, np.asarray(j))
             pairs = zip(times.ravel(), counts.ravel(), strict=True)
             numbers = np.array([self._number_on(float(time), count) for time, count in pairs], dtype=np.int64)
-        flat = times.ravel()
-        states = states_at(self._flows, numbers, flat)
-        return self._read.column(name, flat, states, held_in(self._flows, numbers)).reshape(times.shape + shape)
+        return self._column(name, times.ravel(), numbers).reshape(times.shape + shape)
+
+    def _column(self, name: str, times: FloatArray, numbers: npt.NDArray[np.int64]) -> FloatArray:
+        part = self._read.part(name)
+        if part is None:
+            states = states_at(self._flows, numbers, times)
+            return self._read.column(name, times, states, held_in(self._flows, numbers))
+        if self.variable(name).kind is Kind.DISCRETE:
+            return held_in(self._flows, numbers, part)
+        return states_at(self._flows, numbers, times, part)
 
     # Parts of a run.
 

@@ -73,6 +73,11 @@ class ArcValues(ABC):
         """
         return self._place(name).variable
 
+    def part(self, name: str) -> slice | None:
+        """Return which of the states, continuous or discrete, a variable is; None for what is no state."""
+        place = self._place(name)
+        return place.at if place.variable.kind in (Kind.STATE, Kind.DISCRETE) else None
+
     def _place(self, name: str) -> Place:
         place = self._places.get(name) or self._elements.get(name)
         if place is not None:

@@ -24,11 +24,11 @@ def ends_of(flows: Sequence[FlowRecord]) -> FloatArray:
     return flows.rows.ends if isinstance(flows, RowFlows) else np.array([flow.t1 for flow in flows])
 
 
-def held_in(flows: Sequence[FlowRecord], numbers: Counts) -> FloatArray:
-    """Return the discrete states in the flows of those numbers, one row each."""
+def held_in(flows: Sequence[FlowRecord], numbers: Counts, part: slice = slice(None)) -> FloatArray:
+    """Return the discrete states, or a part of them, in the flows of those numbers, one row each."""
     if isinstance(flows, RowFlows):
-        return flows.rows.held[numbers]
-    held = [flow.z for flow in flows]
+        return flows.rows.held[:, part][numbers]
+    held = [flow.z[part] for flow in flows]
     return np.array([held[k] for k in numbers]).reshape(len(numbers), held[0].size)
 
 
@@ -47,23 +47,24 @@ def sampled(flows: Sequence[FlowRecord]) -> tuple[FloatArray, Counts]:
     return np.concatenate([np.array(times) for times in times_of]), numbers
 
 
-def sampled_states(flows: Sequence[FlowRecord]) -> FloatArray:
-    """Return what flows at those samples, one row each."""
+def sampled_states(flows: Sequence[FlowRecord], part: slice = slice(None)) -> FloatArray:
+    """Return what flows, or a part of it, at those samples, one row each."""
     if isinstance(flows, RowFlows):
         rows, begins = flows.rows, _begins(flows.rows.firsts)
-        states = np.empty((len(begins), rows.states))
-        states[begins], states[~begins] = rows.begun, rows.reached
+        begun, reached = rows.begun[:, part], rows.reached[:, part]
+        states = np.empty((len(begins), begun.shape[1]))
+        states[begins], states[~begins] = begun, reached
         return states
-    points = [x for flow in flows for _, x in flow.points]
-    return np.array(points).reshape(len(points), flows[0].x0.size)
+    points = [x[part] for flow in flows for _, x in flow.points]
+    return np.array(points).reshape(len(points), flows[0].x0[part].size)
 
 
-def states_at(flows: Sequence[FlowRecord], numbers: Counts, times: FloatArray) -> FloatArray:
-    """Return what flows at times (s) in the flows of those numbers, one row each."""
+def states_at(flows: Sequence[FlowRecord], numbers: Counts, times: FloatArray, part: slice = slice(None)) -> FloatArray:
+    """Return what flows, or a part of it, at times (s) in the flows of those numbers, one row each."""
     if isinstance(flows, RowFlows):
-        return flows.rows.at(numbers, times)
-    points = [flows[int(k)].at(float(t)) for k, t in zip(numbers, times, strict=True)]
-    return np.array(points).reshape(len(points), flows[0].x0.size)
+        return flows.rows.at(numbers, times, part)
+    points = [flows[int(k)].at(float(t))[part] for k, t in zip(numbers, times, strict=True)]
+    return np.array(points).reshape(len(points), flows[0].x0[part].size)
 
 
 def _begins(firsts: Counts) -> npt.NDArray[np.bool_]:

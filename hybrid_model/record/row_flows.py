@@ -106,24 +106,28 @@ class Rows:
 
     def vectors(self, step: int | Counts) -> FloatArray:
         """Return the vectors of the interpolation of a step, shape (vectors, states), or of steps."""
-        given = self.steps[step, _BEFORE_STATES + self.states :]
-        count = given.shape[-1] // self.states if self.states else _NESTED_VECTORS
-        return given.reshape(*given.shape[:-1], count, self.states)
+        return self._vectors[step]
 
-    def at(self, flows: Counts, times: FloatArray) -> FloatArray:
-        """Return the states in flows at times in them, shape (times, states)."""
-        states = self.begun[flows]
+    @property
+    def _vectors(self) -> FloatArray:
+        given = self.steps[:, _BEFORE_STATES + self.states :]
+        count = given.shape[-1] // self.states if self.states else _NESTED_VECTORS
+        return given.reshape(len(given), count, self.states)
+
+    def at(self, flows: Counts, times: FloatArray, part: slice = slice(None)) -> FloatArray:
+        """Return the states, or a part of them, in flows at times in them, shape (times, states)."""
+        states = self.begun[:, part][flows]
         inside = times > self.starts[flows]
         if not inside.any():
             return states
         k, t = flows[inside], times[inside]
         # A flow's steps lie in order: count those that end before the time, as far back as the flow goes.
         step = self._steps_at(k, t)
-        row = self.steps[step]
-        if self.events_only and (t < row[:, 2]).any():
-            refuse_inside(t[t < row[:, 2]])
-        found = interpolated(self.vectors(step), ((t - row[:, 0]) / (row[:, 1] - row[:, 0]))[:, None])
-        states[inside] = np.where((t >= row[:, 2])[:, None], self.reached[step], found)
+        t0, t1, cut = self.steps[step, :_BEFORE_STATES].T
+        if self.events_only and (t < cut).any():
+            refuse_inside(t[t < cut])
+        found = interpolated(self._vectors[:, :, part][step], ((t - t0) / (t1 - t0))[:, None])
+        states[inside] = np.where((t >= cut)[:, None], self.reached[:, part][step], found)
         return states
 
     def _steps_at(self, flows: Counts, times: FloatArray) -> Counts:
