@@ -40,6 +40,12 @@ class AutomatonSlave(Slave):
         Accuracy.
     engine : {"auto", "native", "python"}
         As in `hybrid_model.simulate`.
+
+    Attributes
+    ----------
+    automaton : Automaton
+    starts : dict
+        What was set before the start, by scalar.
     """
 
     has_event_mode = True
@@ -80,7 +86,7 @@ class AutomatonSlave(Slave):
         self._ranges = {e: (v.minimum, v.maximum) for v in automaton.variables for e in element_names(v)}
         self._names = [element for kind in Kind for element in layout.names(kind)]
         self._predictable = all(port.discrete for port in ports[Kind.INPUT])
-        self._starts: dict[str, float] = {}
+        self.starts: dict[str, float] = {}
         self._block: AutomatonBlock | NativeBlock | None = None
         self._joined: JoinedBlocks | None = None
         self._begun = False
@@ -110,7 +116,7 @@ class AutomatonSlave(Slave):
                 "tunable=True."
             )
         if self._block is None:
-            self._starts[name] = value
+            self.starts[name] = value
         elif self._joined is not None:
             self._joined.set(self.name, name, value)
         else:
@@ -125,7 +131,7 @@ class AutomatonSlave(Slave):
     def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:
         """See `Slave.start`."""
         self._block = self._block_of((t_start, t_stop), events=events)
-        for name, value in self._starts.items():
+        for name, value in self.starts.items():
             self._block.set(name, value)
         if isinstance(self._block, AutomatonBlock):
             self._block.run.compute_start()

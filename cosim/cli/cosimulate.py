@@ -19,6 +19,7 @@ from cosim.cli.outputs import results_folder
 from cosim.cli.progress import Work
 from cosim.cli.run_files import RunFiles
 from cosim.cli.step_study import study
+from cosim.cli.system_fmus import with_fmus
 from cosim.consensus import fmu_system
 from cosim.errors import CosimError, MisfitError, UsageError
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
@@ -29,7 +30,7 @@ from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
 from cosim.systems.assembly import assemble
-from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
+from cosim.systems.definition import AUTOMATON, FMU, Component, Experiment, SystemDefinition
 from cosim.systems.files import read_system
 from cosim.systems.ssp_writing import write_osp, write_ssp
 from cosim.tables.input_table import read_inputs
@@ -73,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
             system, experiment = _assembled(definition, options, starts), definition.experiment
             options.input_file = options.input_file or definition.inputs
         if options.save_as is not None:
-            return _save(options, definition, system, _completed(options, system, experiment))
+            return _save(options, definition, system, _completed(options, system, experiment), folder)
         return _run(system, options, _completed(options, system, experiment))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -108,11 +109,16 @@ def _slips_of(options: argparse.Namespace) -> Iterator[None]:
         raise
 
 
-def _save(options: argparse.Namespace, definition: SystemDefinition, system: System, experiment: Experiment) -> int:
+def _save(
+    options: argparse.Namespace, definition: SystemDefinition, system: System, experiment: Experiment, folder: Path
+) -> int:
     """Write a system for other tools instead of running it."""
     if options.start_value:
         raise UsageError("--start-value does not go with --save-as: write start values into the system's file.")
     definition = replace(definition, experiment=experiment)
+    if any(component.kind == AUTOMATON for component in definition.components):
+        definition = with_fmus(definition, system, folder, options.fmi)
+        system = _assembled(definition, options, {})
     if options.save_as.suffix.lower() == ".ssp":
         print(write_ssp(definition, system, options.save_as, options.ssp_version))
     else:

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.transitions import Assignments
-from hybrid_model.declare.variables import Value, Values
+from hybrid_model.declare.variables import Kind, Value, Values, element_names
+from hybrid_model.errors import DeclarationError
 
 
 class Wrapper(Automaton):
@@ -58,3 +64,38 @@ class Wrapper(Automaton):
     def output_values(self, s: Values) -> Assignments:
         """See `Automaton.output_values`."""
         return self.automaton.output_values(self.inner(s))
+
+
+def with_starts(automaton: Automaton, values: Mapping[str, float]) -> Automaton:
+    """Return an automaton with other start values and parameters as its own.
+
+    Parameters
+    ----------
+    automaton : Automaton
+    values : mapping
+        Scalar, such as ``x`` or ``w[2]`` -> value.
+
+    Raises
+    ------
+    DeclarationError
+        For what is no variable, or is computed by the automaton.
+    """
+    made, left = Wrapper(automaton), dict(values)
+    variables = []
+    for variable in automaton.variables:
+        elements = element_names(variable)
+        given = [left.pop(name, None) for name in elements]
+        if any(value is not None for value in given):
+            if variable.computed or variable.kind is Kind.OUTPUT:
+                raise DeclarationError(
+                    f"{automaton.name}.{variable.name} is computed, so its start value cannot be given: give the "
+                    "values that it is computed from."
+                )
+            old = variable.start.ravel()
+            new = np.array([k if value is None else value for k, value in zip(old, given, strict=True)])
+            variable = replace(variable, start=new.reshape(variable.shape))
+        variables.append(variable)
+    if left:
+        raise DeclarationError(f"{automaton.name} has nothing named {next(iter(left))!r} to set.")
+    made.variables = tuple(variables)
+    return made

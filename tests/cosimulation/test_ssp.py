@@ -3,6 +3,7 @@
 import zipfile
 from importlib import resources
 
+import fmpy
 import pytest
 from lxml import etree
 
@@ -93,6 +94,9 @@ class Gain(hm.HybridAutomaton):
         return {"y": s.k * s.u}
 
 
+GAINS = {"a": "", "b": "start = { k = 3.0 }", "c": "start.k = 3.0"}
+
+
 class Rod(hm.HybridAutomaton):
     length = hm.Parameter(1.0, unit="m")
     y = hm.Output()
@@ -176,6 +180,31 @@ def test_signals_are_scaled_and_written_as_they_are(tmp_path, exported):
         assert run_fixed_step(assemble(read_system(given)), 1.0, 0.5).final["b.y"] == pytest.approx(153.0)
     with pytest.raises(MisfitError, match=r"a.y -> b.u is scaled, which is not written for libcosim"):
         write_osp(definition, assemble(definition), tmp_path / "osp", 0.1)
+
+
+def test_automata_are_written_as_fmus_with_their_values_as_defaults(tmp_path, capsys):
+    """Many tools apply no bindings. What one set of values makes is made once, and the same for all."""
+    (tmp_path / "system.toml").write_text(
+        "[experiment]\nstop_time = 1.0\n"
+        + "".join(f'[components.{name}]\nautomaton = "{__file__}:Gain"\n{given}\n' for name, given in GAINS.items())
+        + '[connections]\n"b.u" = "a.y"\n'
+    )
+    path = tmp_path / "system.ssp"
+    assert main(["cosim", str(tmp_path / "system.toml"), "--save-as", str(path)]) == 0
+    (tmp_path / "parts").mkdir()
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "parts")
+        fmus = {name: archive.read(f"resources/{name}.fmu") for name in GAINS}
+    assert fmus["b"] == fmus["c"] != fmus["a"]
+    for name, gain in (("a", "1"), ("b", "3")):
+        variables = fmpy.read_model_description(str(tmp_path / "parts" / "resources" / f"{name}.fmu")).modelVariables
+        assert [float(v.start) for v in variables if v.name == "k"] == [float(gain)]
+    # The bindings are there as well.
+    assert [component.start for component in read_system(path).components] == [{}, {"k": "3.0"}, {"k": "3.0"}]
+    capsys.readouterr()
+    for given in (tmp_path / "system.toml", path):
+        assert main(["cosim", str(given), "--master", "fixed-step"]) == 0
+        assert "b.y = 15\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--fmi",
         choices=("2.0", "3.0"),
         default="3.0",
-        help="version of the FMUs that are made of a scenario (default: %(default)s)",
+        help="version of the FMUs that are made of a scenario, and of automata for --save-as (default: %(default)s)",
     )
     parser.add_argument(
         "--tolerance", type=positive, metavar="TOL", help="of the error-controlled master: of each step (default: 1e-9)"
