@@ -1,4 +1,4 @@
-"""Exit codes, and what all commands share."""
+"""Exit codes, which of them an error is, and what all commands share."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.errors import UsageError
+from cosim.errors import CosimError, UsageError
 
 
 class Exit(enum.IntEnum):
@@ -24,6 +24,31 @@ class Exit(enum.IntEnum):
 def exit_of(stop: str) -> Exit:
     """Return the exit status for the name of the way a run ended (`hybrid_model.Stop`, `cosim.result.Ended`)."""
     return {"HORIZON": Exit.DONE, "FINISHED": Exit.DONE, "ZENO": Exit.ZENO}.get(stop, Exit.FAILED)
+
+
+def status_of(error: Exception) -> Exit | None:
+    """Return the exit status of an error, or None if it is a fault of this program.
+
+    Wrong usage is what was typed, and what a scenario says that was named there: names that there are not, values out
+    of range. Failed is what could be begun and did not work: a model, an FMU, a file, a run.
+    """
+    if isinstance(error, UsageError):
+        return Exit.USAGE
+    # Not before there is an error: these take longer to import than the command line.
+    from fmu.errors import BuildError, ExportError
+    from hybrid_model.consensus.messages import ScenarioError
+    from hybrid_model.errors import HybridModelError, NamingError
+
+    if isinstance(error, (ScenarioError, NamingError)):
+        return Exit.USAGE
+    return Exit.FAILED if isinstance(error, (HybridModelError, ExportError, BuildError, CosimError, OSError)) else None
+
+
+def sentence_of(error: Exception) -> str:
+    """Return what people are told of an error: its message, and of the system's errors the file and what to do."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror}. Give a file or a folder that you may read or write."
+    return str(error)
 
 
 def start_values(given: Sequence[str]) -> dict[str, float]:

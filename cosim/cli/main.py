@@ -64,7 +64,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(Exit.DONE)
     except Exception as error:
         # Most of what may be raised is imported by whoever raises it.
-        from cosim.cli.failures import sentence_of, status_of
+        from cosim.cli.exits import sentence_of, status_of
 
         failed = status_of(error)
         if failed is None:
