@@ -114,7 +114,9 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     engine->margins = take(&cursor, rows * sizeof(double));
     engine->enabled = take(&cursor, rows * sizeof(double));
     engine->times = take(&cursor, m->n_times * sizeof(double));
+    engine->times_of = take(&cursor, (m->n_discrete + m->n_parameters) * sizeof(double));
     engine->samples = take(&cursor, N_SAMPLES * rows * sizeof(double));
+    engine->sampled_x = take(&cursor, N_SAMPLES * vector);
     engine->outputs = take(&cursor, m->n_outputs * sizeof(double));
     engine->rates = take(&cursor, vector);
     engine->indicators = take(&cursor, rows * sizeof(double));
@@ -153,6 +155,7 @@ void engine_free(Engine *engine)
         return;
     for (size_t i = 0; i < N_ROW_KINDS; i++)
         free(engine->rows[i].values);
+    engine_free_factors(engine);
     free(engine->block);
     free(engine->scratch);
     free(engine);
@@ -221,7 +224,7 @@ static bool segment_is_sound(const Engine *engine)
     bool sound =
         status->segment_terms <= engine->method->n_vectors && isfinite(status->segment_begin) &&
         isfinite(status->segment_end) && status->segment_begin < status->segment_end &&
-        status->segment_quiet <= status->segment_end;
+        isfinite(status->segment_span) && status->segment_span > 0.0 && status->segment_quiet <= status->segment_end;
     sound = sound && all_finite(engine->segment, engine->method->n_vectors * engine->model->n_states);
     return (sound || !status->has_segment) && !status->behind;
 }

@@ -15,15 +15,14 @@
 #define SHORTEST 16.0
 #define LEFT_OPEN 1e6
 
-bool engine_step_begin(Engine *engine, const Point *point)
+static bool begin_with_rates(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
     Step *step = &engine->step;
     double t = *point->time;
-    step->t0 = step->t1 = t;
-    step->x0 = point->x;
-    step->has_vectors = false;
-    engine_choose_method(engine);
+    if (step->has_rates[0])
+        return true;
+    step->has_rates[0] = true;
     if (!engine_rates(engine, t, point->x, point->z, step->k[0]))
         return false;
     for (size_t i = 0; i < m->n_states; i++)
@@ -35,6 +34,16 @@ bool engine_step_begin(Engine *engine, const Point *point)
                 NAME_AT(m->names, m->state_names[i]), step->k[0][i], t, NAME_AT(m->names, m->state_names[i]),
                 point->x[i]);
     return true;
+}
+
+bool engine_step_begin(Engine *engine, const Point *point)
+{
+    Step *step = &engine->step;
+    step->t0 = step->t1 = *point->time;
+    step->x0 = point->x;
+    step->has_vectors = step->has_rates[0] = false;
+    engine_choose_method(engine);
+    return (engine->method->knows && engine->method->knows(engine, point)) || begin_with_rates(engine, point);
 }
 
 static bool step_too_small(Engine *engine, const Point *point, double h, bool finite)
@@ -82,6 +91,15 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
     const Method *method = engine->method;
     double t0 = *point->time, remaining = limit - t0, h = *point->step, shortest = SHORTEST * engine_time_ulp(t0);
     bool rejected = false;
+    step->is_known = method->known && method->known(engine, point, limit);
+    if (step->is_known) {
+        step->has_rates[1] = step->has_vectors = false;
+        engine->statistics.steps++;
+        return engine_gets_on(engine, point, limit);
+    }
+    if (!begin_with_rates(engine, point))
+        return false;
+    step->has_rates[1] = true;
     if (h <= 0.0 && !length_after_jump(engine, point, limit, &h))
         return false;
     h = fmin(h, engine->options.longest_step);
@@ -91,6 +109,8 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
         double used = whole ? remaining : 2.0 * h > remaining ? 0.5 * remaining : h;
         step->t1 = whole ? limit : t0 + used;
         used = step->t1 - t0;
+        step->begin = t0;
+        step->end = step->t1;
         double error;
         step->n_terms = method->n_vectors;
         step->n_windows = 1;
@@ -129,6 +149,7 @@ void engine_step_commit(Engine *engine, const Point *point)
     /* The last stage is the first one of the next step. */
     step->k[N_STAGES - 1] = step->k[0];
     step->k[0] = last;
+    step->has_rates[0] = step->has_rates[1];
     step->t0 = step->t1;
     step->has_vectors = false;
     engine_choose_method(engine);

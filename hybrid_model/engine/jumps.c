@@ -50,6 +50,7 @@ static bool accept_state(Engine *engine, size_t jump, const Point *point)
             return refused(engine, ENDED_FAILED, jump, m->n_states + i, *point->time,
                            "it is declared integer and must stay a whole number from -2147483648 to 2147483647. "
                            "Remedy: round it in that map, or declare it without integer.");
+    engine_watch_factors(engine, point, engine->reset.z);
     engine_copy(point->x, engine->reset.x, m->n_states + m->n_discrete);
     engine_note_sizes(engine, point);
     engine_begin_anew(engine, point);
@@ -70,11 +71,21 @@ static bool evaluate_reset(Engine *engine, size_t jump, const Point *point)
     return engine->model->reset(jump, engine->arg, engine->res, engine->iw, engine->w) == 0;
 }
 
+/* Times follow from discrete states and parameters alone; whether those are the same as when they were evaluated last,
+   bit by bit. */
+static bool times_are_there(const Engine *engine, const Point *point)
+{
+    const Model *m = engine->model;
+    return engine->has_times && memcmp(engine->times_of, point->z, m->n_discrete * sizeof(double)) == 0 &&
+           memcmp(engine->times_of + m->n_discrete, engine->p, m->n_parameters * sizeof(double)) == 0;
+}
+
 bool engine_evaluate_times(Engine *engine, const Point *point)
 {
     const Model *m = engine->model;
-    if (m->n_times == 0)
+    if (m->n_times == 0 || times_are_there(engine, point))
         return true;
+    engine->has_times = false;
     if (!engine_evaluate(engine, m->times, *point->time, point->x, point->z, engine->times, NULL))
         return engine_fail(engine, ENDED_FAILED, "The event times of '%s' could not be evaluated at t = %.17g.",
                            m->name, *point->time);
@@ -84,6 +95,9 @@ bool engine_evaluate_times(Engine *engine, const Point *point)
                                "the time of jump '%s' is not a number at t = %.9g s; a time event needs a time "
                                "(infinity: never). Remedy: check its expression and the parameters.",
                                NAME_AT(m->names, m->jumps[j].name), *point->time);
+    engine_copy(engine->times_of, point->z, m->n_discrete);
+    engine_copy(engine->times_of + m->n_discrete, engine->p, m->n_parameters);
+    engine->has_times = true;
     return true;
 }
 

@@ -86,6 +86,13 @@ typedef struct {
     ModelFunction forward, reverse, start_forward, start_reverse;
     /* -> d(dx/dt)/dx (n_states^2, by columns), d(dx/dt)/dt (n_states); NULL where `forward` is to do. */
     ModelFunction jacobian;
+    /* Rates of quadratures that are affine in values which only jumps change, those at the places `held` in z and u, one
+       after the other: -> the rates without them (n_states), n_factors functions of time, each a part of the rate
+       `factor_rows` when multiplied by the value number `factor_columns` of those held.  They depend on nothing else
+       than what is at the places `factor_keys` in z, u and p.  NULL, and no factors, where there are none. */
+    ModelFunction factors;
+    size_t n_factors, n_factor_keys;
+    const uint32_t *held, *factor_rows, *factor_columns, *factor_keys;
     const ModelJump *jumps;            /* in the fixed order in which simultaneous ones are taken */
     const ModelName *state_names, *discrete_names, *margin_names;
     const char *names;                 /* heads and tails one after the other, each with its end */

@@ -44,12 +44,14 @@ typedef struct {
     double *progress;         /* see below */
 } Point;
 
-/* What is counted to see whether a flow gets on. */
+/* What is counted to see whether a flow gets on, and what is known of its factors. */
 enum {
     LOOKS_STEPS,              /* of the solver, of which the last ones are looked at */
     LOOKS_BEGIN,              /* s: from where they are counted */
     LOOKS_FOUND,              /* looks that have found a jump of the rates to which the flow leads back */
     PACE_STEPS, PACE_BEGIN,
+    FACTORS_BEGIN, FACTORS_END, /* s: from where to where a series of the factors goes, see held_factors.c; */
+    FACTORS_FOUND,            /* whether there is one */
     N_PROGRESS
 };
 
@@ -59,13 +61,22 @@ typedef struct {
     const double *x0;
     double *x1;
     double *k[N_STAGES];
+    bool has_rates[2];        /* those at t0 are in k[0], those at t1 in k[N_STAGES - 1] */
     double *vectors;          /* of the interpolation, made when first needed */
+    double begin, end;        /* of the interpolation, which may reach beyond the step */
+    bool is_known;            /* it was made without its rates */
     bool has_vectors;
     size_t n_terms;           /* vectors behind these are zero */
     size_t n_windows;         /* equal parts in each of which events are looked for */
 } Step;
 
 typedef struct Method Method;
+
+/* The series of the factors on pieces of time, in rows: see held_factors.c. */
+typedef struct {
+    double *rows, *values, *vectors, *zeros, *sums;
+    size_t n_rows, width;     /* so many rows, a power of two */
+} Factors;
 
 /* What quadratures need beside the step: vectors at the nodes of a series, and of series. */
 typedef struct {
@@ -98,8 +109,9 @@ typedef struct {
     uint32_t recent[N_RECENT];
     uint64_t jumps_taken;         /* in the last advance */
     double stride;                /* what a first step may take from the steps before the last jump or change, or 0 */
-    /* The live point lies on a step of the solver that goes on to segment_end; before segment_quiet nothing happens. */
-    double segment_begin, segment_end, segment_quiet;
+    /* The live point lies on a step of the solver that goes on to segment_end, and whose interpolation is as long as
+       segment_span from segment_begin on; before segment_quiet nothing happens. */
+    double segment_begin, segment_span, segment_end, segment_quiet;
     uint64_t segment_terms;
     int32_t has_segment;
     int32_t behind;               /* the live point's states do not belong to its time yet: see engine_catch_up */
@@ -153,8 +165,11 @@ struct Engine {
     Step step;
     Implicit implicit;            /* without places where no method for stiff flows may be needed */
     Quadrature quadrature;
+    Factors factors;
     double *probe_k[N_STAGES], *probe_x, *dense_x;
-    double *margins, *enabled, *times, *samples;
+    double *margins, *enabled, *times, *samples, *sampled_x;
+    double *times_of;             /* the discrete states and parameters that the times are those of */
+    bool has_times;
     double *outputs, *rates, *indicators;   /* of the view */
     double *seeds[2];
     double *slopes;               /* rates and outputs on both sides of a point */
@@ -264,8 +279,17 @@ void engine_choose_method(Engine *engine);
    stiff flows, whose steps differ by orders of magnitude, the pace so far says nothing: no flow creeps. */
 void engine_watch_stiffness(Engine *engine, const Point *point);
 
+/* held_factors.c */
+/* Memory for the factors of `parts` points that take turns; false without memory. */
+bool engine_keep_factors(Engine *engine, size_t parts);
+void engine_free_factors(Engine *engine);
+/* The point's values are about to become those of `z`. */
+void engine_watch_factors(const Engine *engine, const Point *point, const double *z);
+/* A value of the live point has been set. */
+void engine_note_factors(const Engine *engine, Bank bank, size_t index);
+
 /* integrate.c */
-/* Evaluates the flow at the point into step->k[0]. */
+/* A step may begin at the point: its rates are in step->k[0], if they are not known otherwise. */
 bool engine_step_begin(Engine *engine, const Point *point);
 /* One accepted step from the point towards `limit`, which it never passes; the result is in engine->step. */
 bool engine_step_accept(Engine *engine, const Point *point, double limit);

@@ -13,7 +13,7 @@ void engine_catch_up(Engine *engine)
     if (!status->behind)
         return;
     double t = *engine->live.time;
-    double a = (t - status->segment_begin) / (status->segment_end - status->segment_begin);
+    double a = (t - status->segment_begin) / status->segment_span;
     engine->method->interpolate(engine->segment, (size_t)status->segment_terms, engine->model->n_states, a,
                                 engine->live.x);
     status->behind = false;

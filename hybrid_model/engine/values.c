@@ -145,6 +145,7 @@ void engine_set(Engine *engine, Bank bank, size_t index, double value)
         return;
     engine_leave_segment(engine);
     values[index] = value;
+    engine_note_factors(engine, bank, index);
     /* Guards that were reached by rounding were so in the state before. */
     if (bank == BANK_STATE)
         engine_clear_levels(engine, &engine->live);

@@ -15,6 +15,7 @@ from hybrid_model.declare.variables import Kind
 from hybrid_model.native.c_text import array, boolean, constant, definition, functions, row, string
 from hybrid_model.native.derivatives import derivative_functions, jacobian_function
 from hybrid_model.native.flow_structure import levels_of_quadratures
+from hybrid_model.native.held_factors import HeldFactors, held_factors
 from hybrid_model.native.names import NameTable
 from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.trace import Trace, changed
@@ -33,8 +34,9 @@ def model_code(traced: Trace | NetworkTrace) -> str:
     str
         A C99 translation unit that defines ``const Model model``.
     """
-    maps, work = _maps(traced, derivatives=True, jacobian=traced.automaton.stiff is True)
-    model = model_definition(traced, work, traced.automaton.name, starts=True)
+    held = _held(traced)
+    maps, work = _maps(traced, held, derivatives=True, jacobian=traced.automaton.stiff is True)
+    model = model_definition(traced, work, traced.automaton.name, starts=True, held=held)
     tables = [*_starts(traced.layout), *model_tables(traced.automaton, traced.layout)]
     return "\n".join([_PRELUDE, maps, *tables, model])
 
@@ -57,27 +59,50 @@ def run_code(traced: Trace | NetworkTrace, *, jacobian: bool = False) -> str:
     str
         A C99 translation unit that defines ``const Model model``, for `hybrid_model.native.build.libraries`.
     """
-    maps, work = _maps(traced, derivatives=False, jacobian=jacobian or traced.automaton.stiff is True)
-    model = model_definition(traced, work, type(traced.automaton).__name__)
+    held = _held(traced)
+    maps, work = _maps(traced, held, derivatives=False, jacobian=jacobian or traced.automaton.stiff is True)
+    model = model_definition(traced, work, type(traced.automaton).__name__, held=held)
     return "\n".join([_PRELUDE, maps, *model_tables(traced.automaton, traced.layout), model])
 
 
-def _maps(traced: Trace | NetworkTrace, *, derivatives: bool, jacobian: bool) -> tuple[str, Sequence[int]]:
-    """Return the definitions of the maps and of their derivatives, and the sizes of the work arrays they need."""
+def _held(traced: Trace | NetworkTrace) -> HeldFactors | None:
+    return held_factors(traced) if isinstance(traced, Trace) else None
+
+
+def _maps(
+    traced: Trace | NetworkTrace, held: HeldFactors | None, *, derivatives: bool, jacobian: bool
+) -> tuple[str, Sequence[int]]:
+    """Return the definitions of the maps and of what follows from them, and the sizes of the work arrays they need."""
     if isinstance(traced, NetworkTrace):
         return "\n".join([traced.c_code(), _NO_JACOBIAN]), traced.work_sizes
     found = {**(derivative_functions(traced) if derivatives else {})}
     if jacobian:
         found["jacobian"] = jacobian_function(traced)
+    if held is not None:
+        found["factors"] = held.function
     resets = [_Reset(reset) for reset in traced.resets]
     given = [*traced.functions[: -len(resets) or None], *(reset.function for reset in resets), *found.values()]
     work = [max(getattr(f, size)() for f in given) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
     without = [f"#define hybrid_{name} NULL" for name in _DERIVATIVES if name not in found]
     code = "\n".join(
-        [functions("model", given), '#include "model.h"', "", *_resets(traced, resets, work[-1]), *without]
+        [
+            functions("model", given),
+            '#include "model.h"',
+            "",
+            *_resets(traced, resets, work[-1]),
+            *without,
+            *_held_tables(held),
+        ]
     )
     work[-1] += max((len(reset.x) + len(reset.z) for reset in resets), default=0)
     return code, work
+
+
+def _held_tables(held: HeldFactors | None) -> list[str]:
+    if held is None:
+        return []
+    columns = {"held": held.held, "factor_rows": held.rows, "factor_columns": held.columns, "factor_keys": held.keys}
+    return [array("uint32_t", name, map(str, numbers)) for name, numbers in columns.items()]
 
 
 class _Reset:
@@ -184,6 +209,11 @@ def _jumps(automaton: Automaton, names: NameTable) -> list[str]:
     return rows
 
 
+def _held_fields(held: HeldFactors) -> dict[str, object]:
+    tables = {name: name for name in ("held", "factor_rows", "factor_columns", "factor_keys")}
+    return {"factors": "hybrid_factors", "n_factors": len(held.rows), "n_factor_keys": len(held.keys), **tables}
+
+
 def model_definition(
     traced: Trace | NetworkTrace,
     work: Sequence[int],
@@ -193,6 +223,7 @@ def model_definition(
     starts: bool = False,
     maps: Mapping[str, str] | None = None,
     constants: int = 0,
+    held: HeldFactors | None = None,
 ) -> str:
     """Return the definition of a model.
 
@@ -212,6 +243,8 @@ def model_definition(
         Map -> C function, where not all are there under the names that they have in an FMU.
     constants : int
         Number of parameters behind the automaton's own.
+    held : HeldFactors, optional
+        The factors of its rates, if there are any.
     """
     automaton, sizes = traced.automaton, traced.layout.sizes
     fields = {
@@ -233,6 +266,7 @@ def model_definition(
         **{name: f"start_{name}" if starts else "NULL" for name in _VECTORS},
         **{name: f"hybrid_{name}" if maps is None else maps.get(name, "NULL") for name in _MAPS},
         "scales": row(*(f".{name} = {_number(value)}" for name, value in scales.of_models().items())),
+        **({} if held is None else _held_fields(held)),
         **{name: f"{prefix}{name}" for name in ("nominals", "whole", "jumps")},
         **{name: f"{prefix}{name}" for name in ("state_names", "discrete_names", "margin_names", "names")},
     }

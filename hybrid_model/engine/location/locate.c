@@ -282,7 +282,7 @@ static bool is_too_long(const Search *search, double event)
     const Step *step = &search->engine->step;
     const double far = 10.0, least = 1e3;
     double wait = event - step->t0;
-    if (!search->engine->method->is_exact || !(far * wait < step->t1 - step->t0) ||
+    if (!search->engine->method->is_exact || step->is_known || !(far * wait < step->t1 - step->t0) ||
         wait < least * engine_time_ulp(step->t0))
         return false;
     *search->point->step = 2.0 * wait;
@@ -293,14 +293,15 @@ static bool is_too_long(const Search *search, double event)
 static FlowEnd locate_in_window(Search *search, bool may_narrow)
 {
     Engine *engine = search->engine;
-    for (size_t i = 0; i < N_SAMPLES; i++) {
-        double t = engine_sample_time(search->begin, search->end, i);
-        if (!engine_look(search, ON_INTERPOLATION, t, engine->samples + i * search->n_rows))
-            return FLOW_PROBLEM;
-    }
+    double times[N_SAMPLES];
+    for (size_t i = 0; i < N_SAMPLES; i++)
+        times[i] = engine_sample_time(search->begin, search->end, i);
+    if (!engine_look_at_samples(search, times, engine->samples))
+        return FLOW_PROBLEM;
     if (!refuse_indicators(engine, search))
         return FLOW_PROBLEM;
-    hold_to_set(search);
+    if (engine->model->has_flow_set)
+        hold_to_set(search);
     double guard = INFINITY, leaving = INFINITY; /* lines 16 and 17 */
     bool has_guard = engine_first_guard(search, &guard);
     /* An exit within one instant before a guard, or after it, gives way. */

@@ -15,10 +15,13 @@ static const double POINTS[N_SAMPLES] = {
     0.0, 0.038060233744356624, 0.14644660940672624, 0.30865828381745514, 0.5,
     0.6913417161825449, 0.8535533905932737, 0.9619397662556434, 1.0};
 
+/* An even number, since processors take two at a time. */
+#define N_BOUNDS (N_SAMPLES + 3)
+
 /* What each sample contributes to the Bernstein coefficients of the polynomial through all of them, and
    to four times its last two Chebyshev coefficients: beside a kink the error of the polynomial is twice
    their size.  Lines are samples, so that the sums are independent. */
-static const double CONTRIBUTION[N_SAMPLES][N_SAMPLES + 2] = {
+static const double CONTRIBUTION[N_SAMPLES][N_BOUNDS] = {
     {1.0, -4.375, 9.75, -12.767857142857142, 10.214285714285714,
      -4.875, 1.25, -0.125, 0.0,
      -0.5, 0.25},
@@ -124,10 +127,10 @@ static Shape parabola(const double *samples)
 
 static Shape polynomial(const double *samples)
 {
-    double bounds[N_SAMPLES + 2] = {0.0};
+    double bounds[N_BOUNDS] = {0.0};
     Shape shape = {true, true, true, true, true, true};
     for (size_t k = 0; k < N_SAMPLES; k++)
-        for (size_t i = 0; i < N_SAMPLES + 2; i++)
+        for (size_t i = 0; i < N_BOUNDS; i++)
             bounds[i] += CONTRIBUTION[k][i] * samples[k];
     double tail = fabs(bounds[N_SAMPLES]) + fabs(bounds[N_SAMPLES + 1]);
     for (size_t i = 0; i < N_SAMPLES; i++) {

@@ -2,6 +2,7 @@
 #include <float.h>
 #include <math.h>
 
+#include "method.h"
 #include "search.h"
 
 /* Where a state is no number, that is the flow map's fault and not a margin's. */
@@ -60,6 +61,55 @@ bool engine_look(Search *search, Path path, double t, double *rows)
         return !(search->failed = true);
     engine_copy(rows, engine->margins, engine->model->n_margins);
     return !engine->model->has_flow_set || look_outside(search, t, x, &rows[search->exit_row]);
+}
+
+/* The states at all samples of a window at once. */
+static void states_at_samples(Engine *engine, const double *times, double *states)
+{
+    const Step *step = &engine->step;
+    size_t n = engine->model->n_states;
+    double parts[N_SAMPLES];
+    for (size_t i = 0; i < N_SAMPLES; i++)
+        parts[i] = (times[i] - step->begin) / (step->end - step->begin);
+    engine->method->interpolate_samples(engine_step_vectors(engine), step->n_terms, n, parts, states);
+    if (times[0] == step->t0)
+        engine_copy(states, step->x0, n);
+    if (times[N_SAMPLES - 1] == step->t1)
+        engine_copy(states + (N_SAMPLES - 1) * n, step->x1, n);
+}
+
+/* False where a margin cannot be evaluated, or is not a number. */
+static bool margins_at(Engine *engine, const double *t, const double *x, const double *z, double *margins)
+{
+    const Model *m = engine->model;
+    engine_bind(engine, t, x, z, margins, NULL);
+    if (m->n_margins > 0 && m->margins(engine->arg, engine->res, engine->iw, engine->w, 0) != 0)
+        return false;
+    for (size_t i = 0; i < m->n_margins; i++)
+        if (isnan(margins[i]))
+            return false;
+    return true;
+}
+
+bool engine_look_at_samples(Search *search, const double *times, double *rows)
+{
+    Engine *engine = search->engine;
+    const Model *m = engine->model;
+    double *states = engine->sampled_x;
+    if (engine->method->interpolate_samples)
+        states_at_samples(engine, times, states);
+    for (size_t i = 0; i < N_SAMPLES; i++, rows += search->n_rows, states += m->n_states) {
+        if (!engine->method->interpolate_samples || m->has_flow_set) {
+            if (!engine_look(search, ON_INTERPOLATION, times[i], rows))
+                return false;
+            continue;
+        }
+        if (!states_are_finite(engine, times[i], states) ||
+            (!margins_at(engine, &times[i], states, search->point->z, rows) &&
+             !engine_evaluate_margins(engine, times[i], states, search->point->z)))
+            return !(search->failed = true);
+    }
+    return true;
 }
 
 bool engine_try_to_look(Search *search, Path path, double t, double *rows)

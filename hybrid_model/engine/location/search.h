@@ -51,6 +51,8 @@ typedef struct {
 bool engine_look(Search *search, Path path, double t, double *rows);
 /* The same where the run need not come: a failure only says that nothing is known. */
 bool engine_try_to_look(Search *search, Path path, double t, double *rows);
+/* The same at the times of the samples of a window, one row of margins after the other. */
+bool engine_look_at_samples(Search *search, const double *times, double *rows);
 /* The value of one row. */
 double engine_look_at(Search *search, Path path, double t, size_t row);
 /* The value of one row in a sample of the window. */

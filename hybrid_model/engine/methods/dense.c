@@ -33,7 +33,7 @@ const double *engine_step_vectors(Engine *engine)
 void engine_step_dense(Engine *engine, double t)
 {
     const Step *step = &engine->step;
-    double a = (t - step->t0) / (step->t1 - step->t0);
+    double a = (t - step->begin) / (step->end - step->begin);
     const double *vectors = engine_step_vectors(engine);
     engine->method->interpolate(vectors, step->n_terms, engine->model->n_states, a, engine->dense_x);
 }
@@ -43,7 +43,8 @@ void engine_segment_keep(Engine *engine)
     Status *status = engine->status;
     engine_copy(engine->segment, engine_step_vectors(engine), engine->method->n_vectors * engine->model->n_states);
     status->segment_terms = engine->step.n_terms;
-    status->segment_begin = engine->step.t0;
+    status->segment_begin = engine->step.begin;
+    status->segment_span = engine->step.end - engine->step.begin;
     status->segment_end = engine->step.t1;
     status->has_segment = true;
 }

@@ -94,15 +94,18 @@ static bool probe(Engine *engine, const Point *point, double t)
     const Quadrature *q = &engine->quadrature;
     size_t n = engine->model->n_states;
     if (t >= step->t0 && t <= step->t1 && step->t0 < step->t1) {
-        engine_series_at(step->vectors, step->n_terms, n, (t - step->t0) / (step->t1 - step->t0), engine->probe_x);
+        engine_series_at(step->vectors, step->n_terms, n, (t - step->begin) / (step->end - step->begin), engine->probe_x);
         return true;
     }
     size_t n_terms;
     bool after = t > step->t1 && step->t0 < step->t1;
     const double *from = after ? step->x1 : step->x0;
-    engine_copy(q->rates, step->k[after ? N_STAGES - 1 : 0], n);
-    if (!make_series(engine, point->z, from, after ? step->t1 : step->t0, t, COARSE, FINEST + 1, q->series,
-                     &n_terms))
+    double start = after ? step->t1 : step->t0;
+    if (step->has_rates[after])
+        engine_copy(q->rates, step->k[after ? N_STAGES - 1 : 0], n);
+    else if (!engine_rates(engine, start, from, point->z, q->rates))
+        return false;
+    if (!make_series(engine, point->z, from, start, t, COARSE, FINEST + 1, q->series, &n_terms))
         return false;
     engine_series_at_end(q->series, n_terms, n, from, engine->probe_x);
     return true;
@@ -120,9 +123,12 @@ const Method engine_quadrature = {
     .is_exact = true,
     .remembers = true,
     .segment_part = 1.0,
+    .knows = engine_knows_factors,
+    .known = engine_step_of_factors,
     .trial = trial,
     .probe = probe,
     .prepare = prepare,
     .interpolate = engine_series_at,
+    .interpolate_samples = engine_series_at_samples,
     .straight = engine_straight_series,
 };

@@ -58,6 +58,8 @@ static bool make_group(Schedule *schedule, Group *group, const Model *maps, cons
     Engine *engine = group->engine = engine_create(maps, 0);
     if (!engine)
         return false;
+    if (!engine_keep_factors(engine, group->count))
+        return false;
     engine_set_jump_hook(engine, note_jump, schedule);
     group->home = engine->block;
     group->block_size = engine_block_size(engine);

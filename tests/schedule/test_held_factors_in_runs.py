@@ -1,0 +1,80 @@
+"""Parts whose rates are affine in what they hear: events against closed forms, over many receptions on one piece."""
+
+import numpy as np
+import pytest
+
+import hybrid_model as hm
+
+
+class Speaker(hm.HybridAutomaton):
+    """Says another number at the times first + k period."""
+
+    first = hm.Parameter(0.1)
+    period = hm.Parameter(0.37)
+    k = hm.DiscreteState(0.0)
+    said = hm.DiscreteState(0.8, output=True)
+
+    transitions = (
+        hm.TimeEvent(
+            "say",
+            lambda self, s: s.first + s.k * s.period,
+            lambda self, s: {"k": s.k + 1.0, "said": np.cos(2.0 * s.k + s.first)},
+        ),
+    )
+
+
+class Walker(hm.HybridAutomaton):
+    """x' = cos(w t) u + side v, where v changes sides at breakpoints; marks x wherever it has gone far enough."""
+
+    x = hm.State(0.0, output=True)
+    u = hm.Input(0.0, discrete=True)
+    w = hm.Parameter(3.0)
+    far = hm.Parameter(0.05)
+    mark = hm.DiscreteState(0.0, output=True)
+    side = hm.DiscreteState(1.0)
+    turns = hm.DiscreteState(1.0)
+
+    def flow_map(self, s):
+        return {"x": np.cos(s.w * s.t) * (s.u - s.mark) + 0.1 * s.side}
+
+    transitions = (
+        hm.Jump("mark", lambda self, s: np.abs(s.x - s.mark) - s.far, lambda self, s: {"mark": s.x}),
+        hm.TimeEvent(
+            "turn",
+            lambda self, s: 1.5 * s.turns,
+            lambda self, s: {"side": -s.side, "turns": s.turns + 1.0},
+            internal=True,
+        ),
+    )
+
+
+def walked(w, heard, mark, x, a, b):
+    """x at b, with nothing but breakpoints on the way from a."""
+    turns = 1.5 * np.arange(1, 40)
+    edges = np.concatenate([[a], turns[(turns > a) & (turns < b)], [b]])
+    sides = (-1.0) ** np.floor(0.5 * (edges[1:] + edges[:-1]) / 1.5)
+    return x + (heard - mark) * (np.sin(w * b) - np.sin(w * a)) / w + 0.1 * float(np.sum(sides * np.diff(edges)))
+
+
+@pytest.mark.parametrize("w", [0.3, 3.0, 11.0])
+def test_events_are_where_the_closed_form_has_them(w):
+    """Each reception changes the rate; x is that of the integral, to some roundings, at each event."""
+    end = 12.0
+    parts = {"speaker": Speaker(), "walker": Walker(w=w)}
+    network = hm.Composition("walk", parts, {"walker.u": "speaker.said"})
+    run = hm.simulate_network(network, end, engine="native")
+    t, x, mark, heard, marks = 0.0, 0.0, 0.0, 0.8, 0
+    for part, jump in run.jumps:
+        if jump.name == "turn":
+            continue
+        x, before = walked(w, heard, mark, x, t, jump.t), (t, x)
+        if part == "speaker":
+            heard = np.cos(2.0 * jump.z_before[0] + 0.1)
+        else:
+            assert abs(abs(x - mark) - 0.05) < 1e-12, jump.t
+            between = np.linspace(before[0], jump.t, 50)[1:-1]
+            assert all(abs(walked(w, heard, mark, before[1], before[0], s) - mark) < 0.05 for s in between)
+            mark, marks = x, marks + 1
+        t = jump.t
+    assert marks > 10
+    assert run.arcs["walker"].at("x", end) == pytest.approx(walked(w, heard, mark, x, t, end), abs=1e-12)
