@@ -161,7 +161,9 @@ def _compiler_for(platforms: Sequence[Platform]) -> list[str]:
 
 
 def _checked(sources: Sequence[Path]) -> list[Path]:
-    files = [Path(source).resolve() for source in sources]
+    # Ours are known by absolute paths already.
+    own = frozenset(OWN_FOLDERS)
+    files = [source if source.parent in own else source.resolve() for source in map(Path, sources)]
     for file in files:
         if not file.is_file():
             raise BuildError(f"The C source '{file.name}' does not exist; every source must. Remedy: export it first.")

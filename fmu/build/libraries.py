@@ -133,12 +133,14 @@ def _units(
     folder: Path,
 ) -> list[Unit]:
     """Return what is to be compiled for a platform, in the order of the sources."""
-    engine = [source for source in sources if source.parent in own_folders and source.parent in ENGINE_FOLDERS]
-    own = [source for source in sources if source.parent in own_folders and source not in engine]
+    places = frozenset(own_folders)
+    engines = places & frozenset(ENGINE_FOLDERS)
+    engine = [source for source in sources if source.parent in engines]
+    own = [source for source in sources if source.parent in places - engines]
     # The engine knows no FMI, and its objects serve the runs of this machine too.
     units = kept_units(engine, ENGINE_FOLDERS, toolchain, folder)
     units += kept_units(own, own_folders, toolchain, folder, include_dirs)
-    generated = [source for source in sources if source.parent not in own_folders]
+    generated = [source for source in sources if source.parent not in places]
     for unit in kept_units(generated, own_folders, toolchain, folder, include_dirs, GENERATED_FLAGS):
         units.append(
             unit if _knows_its_headers(unit.source, (*own_folders, *include_dirs)) else replace(unit, key=None)

@@ -97,7 +97,7 @@ def _starts_unknown(variable: FmuVariable) -> bool:
 
 
 class _Maps:
-    """The dependencies of all maps of a trace, as rows of one matrix; `first` tells where each map begins."""
+    """The dependencies of all maps of a trace, as rows of one matrix; `heights` has the number of rows of each map."""
 
     def __init__(self, traced: Any) -> None:
         self.traced = traced
@@ -108,9 +108,11 @@ class _Maps:
         kinds = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER)
         self.ends = np.cumsum([0, 1, *(sizes[kind] for kind in kinds)])
         self.begins = dict(zip(_ARGUMENTS.values(), self.ends[:-1].tolist(), strict=True))
-        self.parts: dict[str, Matrix] = {name: self._row(name) for name in _MAPS}
-        self.parts |= {name: self._itself(name) for name in ("t", "x", "z")}
-        self.parts |= self._events()
+        parts = {name: self._row(name) for name in _MAPS}
+        parts |= {name: self._itself(name) for name in ("t", "x", "z")}
+        parts |= self._events(parts)
+        self.heights = {name: int(part.shape[0]) for name, part in parts.items()}
+        self.matrix = sparse.csr_array(sparse.vstack(list(parts.values())))
 
     def at_start(self) -> _Maps:
         """Return the dependencies at the start, where computed states come out of the start map."""
@@ -120,13 +122,15 @@ class _Maps:
         start: _Maps = object.__new__(_Maps)
         start.traced, start.told, start.margins = self.traced, self.told, self.margins
         start.ends, start.begins = self.ends, self.begins
-        start.parts = {name: _chained(matrix, chain) for name, matrix in self.parts.items() if name not in _EVENTS}
+        # Events are the last rows.
+        start.heights = {name: height for name, height in self.heights.items() if name not in _EVENTS}
+        start.matrix = _chained(self.matrix[: sum(start.heights.values())], chain)
         return start
 
-    def _events(self) -> dict[str, Matrix]:
+    def _events(self, parts: Mapping[str, Matrix]) -> dict[str, Matrix]:
         """Return what discrete states and outputs depend on in Event Mode by way of the jump that comes next."""
-        after = after_jumps(self.traced, self.parts["margins"], self.parts["flow_set"])
-        outputs = (self.parts["outputs"] != 0).astype(np.int64)
+        after = after_jumps(self.traced, parts["margins"], parts["flow_set"])
+        outputs = (parts["outputs"] != 0).astype(np.int64)
         columns = (self._columns(Bank.STATE), self._columns(Bank.DISCRETE))
         by_states = [outputs[:, at] @ after[kind].astype(np.int64) for at, kind in zip(columns, after, strict=True)]
         found = {"z after": after[Kind.DISCRETE], "outputs after": by_states[0] + by_states[1]}
@@ -143,13 +147,12 @@ class _Maps:
             tunable = [
                 k for place in parameters if place.variable.tunable for k in range(place.at.start, place.at.stop)
             ]
-            sides = factors(getattr(self.traced, name), "xz".index(part), tunable)
-        else:
-            patterns = [sparse.csr_array(self.traced.pattern(result, argument)) for argument in _ARGUMENTS]
-            if result == "flow_set":
-                # The margin of a network is the least of its parts' margins.
-                patterns = [sparse.csr_array(pattern.sum(axis=0)[np.newaxis]) for pattern in patterns]
-            sides = [(pattern != 0).astype(np.int64) * (Factor.DEPENDENT + 1) for pattern in patterns]
+            return factors(getattr(self.traced, name), "xz".index(part), tunable)
+        patterns = [sparse.csr_array(self.traced.pattern(result, argument)) for argument in _ARGUMENTS]
+        if result == "flow_set":
+            # The margin of a network is the least of its parts' margins.
+            patterns = [sparse.csr_array(pattern.sum(axis=0)[np.newaxis]) for pattern in patterns]
+        sides = [(pattern != 0).astype(np.int64) * (Factor.DEPENDENT + 1) for pattern in patterns]
         return sparse.csr_array(sparse.hstack(sides))
 
     def _itself(self, argument: str) -> Matrix:
@@ -169,7 +172,7 @@ class _Maps:
             if known[position] and variable.bank in self.begins:
                 at = self.begins[variable.bank] + variable.index
                 columns[at : at + variable.size] = position
-        found = _gathered(sparse.csr_array(sparse.vstack(list(self.parts.values()))), rows, owners, columns)
+        found = _gathered(self.matrix, rows, owners, columns)
         countdown = [k for k, v in enumerate(variables) if v.bank is Bank.COUNTDOWN and known[k]]
         unknowns = []
         for position, variable in enumerate(variables):
@@ -183,7 +186,7 @@ class _Maps:
 
     def _rows(self, variables: Sequence[FmuVariable]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
         """Return which rows tell about which variables."""
-        first = dict(zip(self.parts, np.cumsum([0, *(part.shape[0] for part in self.parts.values())]), strict=False))
+        first = dict(zip(self.heights, np.cumsum([0, *self.heights.values()]).tolist(), strict=False))
         rows: list[int] = []
         owners: list[int] = []
         for position, variable in enumerate(variables):
@@ -197,7 +200,7 @@ class _Maps:
         plain = {Bank.DERIVATIVE: "flow", Bank.OUTPUT: "outputs", Bank.STATE: "x", Bank.DISCRETE: "z", Bank.TIME: "t"}
         if variable.bank in plain:
             name = plain[variable.bank]
-            shown = variable.causality == "output" and variable.discrete and f"{name} after" in self.parts
+            shown = variable.causality == "output" and variable.discrete and f"{name} after" in self.heights
             return [(name, index, size), *([(f"{name} after", index, size)] if shown else [])]
         if variable.bank is Bank.INDICATOR:
             return [("margins", index, 1) if index < len(self.margins) else ("flow_set", 0, 1)]

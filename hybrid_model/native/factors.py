@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy import sparse
 
 Matrix: TypeAlias = Any  # scipy.sparse.csr_array of int
-"""Elements of a result by elements of an argument."""
+"""Elements of a result by elements of all arguments side by side."""
 
 
 class Factor(enum.IntEnum):
@@ -37,8 +37,8 @@ _STEPS = frozenset(
 """Operations whose derivative hides that they jump."""
 
 
-def factors(function: ca.Function, result: int = 0, tunable: Sequence[int] = ()) -> list[Matrix]:
-    """Classify the dependencies of a function's result on each of its arguments t, x, z, u, p.
+def factors(function: ca.Function, result: int = 0, tunable: Sequence[int] = ()) -> Matrix:
+    """Classify the dependencies of a function's result on its arguments t, x, z, u, p.
 
     Parameters
     ----------
@@ -51,15 +51,15 @@ def factors(function: ca.Function, result: int = 0, tunable: Sequence[int] = ())
 
     Returns
     -------
-    list of csr_array of int
-        One an argument: `Factor` + 1 where an element of the result depends on one of the argument, else nothing.
+    csr_array of int
+        The arguments side by side: `Factor` + 1 where an element of the result depends on one of them, else nothing.
     """
     arguments = function.sx_in()
     expression = function.call(arguments)[result]
     stepped = _stepped(arguments, expression)
-    classified = []
+    found: list[tuple[npt.NDArray[np.int64], ...]] = []
     ends = np.cumsum([0, *(argument.numel() for argument in arguments)])
-    for number, argument in enumerate(arguments):
+    for number in range(len(arguments)):
         pattern = function.jac_sparsity(result, number)
         rows, columns = (np.array(index, dtype=np.int64) for index in pattern.get_triplet())
         kinds = _kinds(arguments, expression, number, rows, columns, tunable)
@@ -68,9 +68,9 @@ def factors(function: ca.Function, result: int = 0, tunable: Sequence[int] = ())
                 bool(stepped[row] >> int(ends[number] + column) & 1) for row, column in zip(rows, columns, strict=True)
             ]
             kinds[through] = Factor.DEPENDENT
-        shape = (expression.numel(), argument.numel())
-        classified.append(sparse.csr_array((kinds + 1, (rows, columns)), shape=shape))
-    return classified
+        found.append((kinds + 1, rows, columns + ends[number]))
+    values, rows, columns = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return sparse.csr_array((values, (rows, columns)), shape=(expression.numel(), int(ends[-1])))
 
 
 def _kinds(

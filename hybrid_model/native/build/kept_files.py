@@ -8,6 +8,7 @@ its name is deleted and made again. Without a cache that can be written, files l
 from __future__ import annotations
 
 import atexit
+import functools
 import hashlib
 import os
 import secrets
@@ -15,7 +16,7 @@ import shutil
 import tempfile
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
@@ -46,7 +47,7 @@ def kept(name: str, key: str, make: Callable[[Path], None]) -> Path:
     Path
         The file, not to be changed. Other processes may delete it once it is the one unused for longest.
     """
-    found = _find(name, key)
+    [found] = _find([(name, key)])
     if found is not None:
         return found[0]
     with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as scratch:
@@ -57,14 +58,18 @@ def kept(name: str, key: str, make: Callable[[Path], None]) -> Path:
 
 def kept_content(name: str, key: str) -> bytes | None:
     """Return the content of a file that was kept, or None if there is none."""
-    found = _find(name, key)
-    return None if found is None else found[1]
+    return kept_contents([(name, key)])[0]
+
+
+def kept_contents(wanted: Sequence[tuple[str, str]]) -> list[bytes | None]:
+    """Return the contents of files that were kept, by names and keys, and None for each that was not."""
+    return [None if found is None else found[1] for found in _find(wanted)]
 
 
 def keep(name: str, key: str, content: bytes) -> Path:
     """Keep a file, in the cache if that is possible, else for as long as the process runs."""
     digest = _key_digest(name, key)
-    folder, final = _shared(digest), f"{digest}-{_digest(content)}-{name}"
+    folder, final = _shared(trusted_folder(), digest[0]), f"{digest}-{_digest(content)}-{name}"
     if folder is not None:
         # Whatever is wrong with it, a full disk or another's lock, this process can go on.
         with suppress(OSError):
@@ -72,13 +77,21 @@ def keep(name: str, key: str, content: bytes) -> Path:
     return _stored(content, _Own.folder(), final)
 
 
-def _find(name: str, key: str) -> tuple[Path, bytes] | None:
-    digest = _key_digest(name, key)
-    for folder in (_shared(digest), _Own.made()):
-        found = _found(folder, digest) if folder else None
-        if found is not None:
-            return found
-    return None
+def _find(wanted: Sequence[tuple[str, str]]) -> list[tuple[Path, bytes] | None]:
+    """Look for files; who may write to the cache is asked once for all of them, and each folder listed once."""
+    digests = [_key_digest(name, key) for name, key in wanted]
+    root = trusted_folder()
+    shared = {digit: _shared(root, digit) for digit in {digest[0] for digest in digests}}
+    names = functools.cache(_names)
+
+    def find(digest: str) -> tuple[Path, bytes] | None:
+        for folder in (shared[digest[0]], _Own.made()):
+            found = _found(folder, names(folder).get(digest, [])) if folder else None
+            if found is not None:
+                return found
+        return None
+
+    return [find(digest) for digest in digests]
 
 
 def _key_digest(name: str, key: str) -> str:
@@ -89,12 +102,11 @@ def _digest(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:_DIGITS]
 
 
-def _shared(digest: str) -> Path | None:
-    """Return the folder of the cache for a key, or None if the cache cannot be used."""
-    root = trusted_folder()
+def _shared(root: Path | None, digit: str) -> Path | None:
+    """Return the folder of the cache for digests that begin so, or None if the cache cannot be used."""
     if root is None:
         return None
-    folder = root / digest[0]
+    folder = root / digit
     try:
         folder.mkdir(mode=0o700, exist_ok=True)
         return folder if is_private(folder) else None
@@ -102,12 +114,17 @@ def _shared(digest: str) -> Path | None:
         return None
 
 
-def _found(folder: Path, digest: str) -> tuple[Path, bytes] | None:
-    """Return the whole file of a key and its content; damaged ones are deleted."""
-    try:
-        names = [name for name in os.listdir(folder) if name.startswith(digest)]
-    except OSError:
-        return None
+def _names(folder: Path) -> dict[str, list[str]]:
+    """Return the names of a folder's files by the digests of their keys."""
+    names: dict[str, list[str]] = {}
+    with suppress(OSError):
+        for name in os.listdir(folder):
+            names.setdefault(name[:_DIGITS], []).append(name)
+    return names
+
+
+def _found(folder: Path, names: Sequence[str]) -> tuple[Path, bytes] | None:
+    """Return the whole file among those of a key, and its content; damaged ones are deleted."""
     for path in (folder / name for name in names):
         # It may vanish at any time, and a read-only cache has no times of use.
         with suppress(OSError):

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hybrid_model.native.build.jobs import Task, run_all
-from hybrid_model.native.build.kept_files import keep, kept_content
+from hybrid_model.native.build.kept_files import keep, kept_contents
 
 COMMON_FLAGS = ("-std=c99", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 STRICT_FLAGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wformat=2")
@@ -111,13 +111,12 @@ def compile_units(units: Sequence[Unit], scratch: Path, progress: Callable[[str]
     BuildError
         If the compiler cannot be started or fails.
     """
-    missing = []
-    for unit in units:
-        known = None if unit.key is None else kept_content(unit.source.stem, unit.key)
-        if known is None:
-            missing.append(unit)
-        else:
-            unit.file.write_bytes(known)
+    keyed = [unit for unit in units if unit.key is not None]
+    known = kept_contents([(unit.source.stem, str(unit.key)) for unit in keyed])
+    found = {unit: content for unit, content in zip(keyed, known, strict=True) if content is not None}
+    for unit, content in found.items():
+        unit.file.write_bytes(content)
+    missing = [unit for unit in units if unit not in found]
     if progress is not None:
         progress(f"compiling {len(missing)} of {len(units)} C files")
     last = {unit.folder: unit for unit in missing}
