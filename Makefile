@@ -5,6 +5,16 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 # Threads cost more than they give on matrices of some ten rows.
 export OPENBLAS_NUM_THREADS := 1
+# The tests start hundreds of processes: without bytecode each of them compiles the packages anew.
+unexport PYTHONDONTWRITEBYTECODE
+
+LINT := $(BIN)/ruff format --check . && $(BIN)/ruff check . && $(BIN)/lint-imports --no-cache
+# Types take one processor half a minute: they are checked beside the rest, and what there is to say comes last.
+define beside_types
+	types=$$(mktemp) || exit; $(BIN)/mypy > "$$types" 2>&1 & checked=$$!; \
+	$(1); status=$$?; \
+	wait $$checked || status=1; cat "$$types"; rm "$$types"; exit $$status
+endef
 
 .PHONY: run test test-long faults benchmark docs notebooks lint format clean
 
@@ -12,8 +22,8 @@ run: $(READY)
 	$(BIN)/hybrid-fmu paper --out results
 
 # Neighbours in a file share what they make, so each process begins with tests that lie together.
-test: lint
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not long and not faults"
+test: $(READY)
+	$(call beside_types,$(LINT) && $(BIN)/python -m pytest -n 2 --dist worksteal -m "not long and not faults")
 
 # Also draws fresh cases for the tests that draw any; SEED=N draws those of an earlier run again.
 SEED ?= $(shell od -An -N4 -tu4 /dev/urandom | tr -d ' ')
@@ -41,10 +51,7 @@ notebooks: $(READY)
 	$(BIN)/python tests/support/notebook_run.py
 
 lint: $(READY)
-	$(BIN)/ruff format --check .
-	$(BIN)/ruff check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports --no-cache
+	$(call beside_types,$(LINT))
 
 format: $(READY)
 	$(BIN)/ruff format .
