@@ -12,10 +12,12 @@ from witnesses import Mix
 import cosim
 from fmu.build.binaries import OWN_FOLDERS, fmi_headers, own_files
 from fmu.build.fmu_code import fmu_code
+from fmu.build.libraries import _units
 from fmu.describe.variable_table import fmu_variables
 from fmu.describe.variables import Fmi
 from hybrid_model.native.build.compiler import find_compiler
-from hybrid_model.native.build.objects import COMMON_FLAGS, GENERATED_FLAGS, STRICT_FLAGS
+from hybrid_model.native.build.libraries import _toolchain
+from hybrid_model.native.build.objects import COMMON_FLAGS, GENERATED_FLAGS, STRICT_FLAGS, compile_units
 from hybrid_model.native.networks.network import trace_any
 
 ROUNDS = Path(cosim.__file__).with_name("rounds.c")
@@ -33,12 +35,27 @@ def room_of(source):
     return "engine" if source.parent.name in ("location", "methods") else source.parent.name
 
 
-def compiled(source, folder, flags=(*COMMON_FLAGS, *STRICT_FLAGS, "-Werror")):
-    """The object of a C file. Users' compilers may warn of more than ours, which has to be content."""
+INCLUDES = [*(f"-I{place}" for place in OWN_FOLDERS), "-isystem", str(fmi_headers())]
+
+
+def compiled(source, folder, flags):
     target = folder / f"{source.stem}.o"
-    includes = [*(f"-I{place}" for place in OWN_FOLDERS), "-isystem", str(fmi_headers())]
-    subprocess.run([*find_compiler(), *flags, "-c", source, *includes, "-o", target], check=True)
+    subprocess.run([*find_compiler(), *flags, "-c", source, *INCLUDES, "-o", target], check=True)
     return target
+
+
+# Users' compilers may warn of more than ours, which has to be content.
+SPOTLESS = [*find_compiler(), *COMMON_FLAGS, *STRICT_FLAGS, "-Werror", *INCLUDES]
+
+
+def test_the_compiler_does_not_warn_of_what_it_reads():
+    subprocess.run([*SPOTLESS, "-fsyntax-only", *own_files("*.c"), ROUNDS], check=True)
+
+
+@pytest.mark.long
+def test_the_compiler_does_not_warn_of_what_it_optimises(tmp_path):
+    """Such as a variable that is not set on some way through a function."""
+    subprocess.run([*SPOTLESS, "-c", *own_files("*.c"), ROUNDS], cwd=tmp_path, check=True)
 
 
 def names_in(target, *options):
@@ -48,9 +65,11 @@ def names_in(target, *options):
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory):
-    """The object of each C file, a master's own one too."""
+    """The object of each C file as FMUs have it, and a master's own one."""
     folder = tmp_path_factory.mktemp("objects")
-    return {source: compiled(source, folder) for source in [*own_files("*.c"), ROUNDS]}
+    units = _units(own_files("*.c"), OWN_FOLDERS, [fmi_headers()], _toolchain(), folder)
+    compile_units(units, folder)
+    return {unit.source: unit.file for unit in units} | {ROUNDS: compiled(ROUNDS, folder, COMMON_FLAGS)}
 
 
 @pytest.fixture(scope="module")

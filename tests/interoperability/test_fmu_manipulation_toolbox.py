@@ -1,6 +1,7 @@
 """FMU Manipulation Toolbox: its checks, its build of our sources, and containers with our FMUs inside, run by fmpy."""
 
 import logging
+import os
 import shutil
 import zipfile
 
@@ -51,10 +52,18 @@ def test_its_checks_find_nothing(name, fmi, exported, caplog):
 
 
 @pytest.mark.parametrize("fmi", [pytest.param("2.0", marks=pytest.mark.long), "3.0"])
-def test_it_builds_our_sources(fmi, exported, tmp_path):
-    """Without the options of our build, and with the compiler that it finds."""
+def test_it_builds_our_sources(fmi, exported, tmp_path, monkeypatch):
+    """Without the options of our build, and with the compiler that it finds: here one that does not optimise."""
     if shutil.which("gcc") is None:
         pytest.skip("there is no gcc")
+    for name in ("cc", "gcc"):
+        found = shutil.which(name)
+        if found is not None:
+            quick = tmp_path / "bin" / name
+            quick.parent.mkdir(exist_ok=True)
+            quick.write_text(f'#!/bin/sh\nexec "{found}" "$@" -O0\n')
+            quick.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}{os.pathsep}{os.environ['PATH']}")
     path = exported(BouncingBall(), "ball", fmi)
     with zipfile.ZipFile(path) as ours, zipfile.ZipFile(tmp_path / "bare.fmu", "w") as bare:
         for name in ours.namelist():

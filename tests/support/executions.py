@@ -1,5 +1,6 @@
 """The runs of a case of the catalogue in Python, with inputs that step, and what an FMU of it shows."""
 
+import bisect
 import functools
 
 import numpy as np
@@ -21,21 +22,27 @@ def python_run(case):
 
 def step_inputs(case):
     """The inputs of a case as signals with breakpoints."""
-    inputs = {}
+    inputs, start = {}, starts(case.automaton)
     for variable in case.automaton.of_kind(Kind.INPUT):
-        elements = element_names(variable)
-        if any(name in case.steps for name in elements):
-            breakpoints = sorted({t for name in elements for t, _ in case.steps.get(name, ())})
-            inputs[variable.name] = hm.Signal(lambda t, v=variable: step_values(case, v, t), breakpoints)
+        steps = {name: case.steps.get(name, ()) for name in element_names(variable)}
+        if any(steps.values()):
+            times = sorted({t for of_element in steps.values() for t, _ in of_element})
+            # Before the first time the start values hold.
+            held = [
+                np.reshape([_last(start[name], steps[name], time) for name in steps], variable.shape)
+                for time in (-np.inf, *times)
+            ]
+            inputs[variable.name] = hm.Signal(_steps(times, held), times)
     return inputs
 
 
-def step_values(case, variable, t):
-    start = starts(case.automaton)
-    values = []
-    for name in element_names(variable):
-        values.append([start[name], *(value for time, value in case.steps.get(name, ()) if time <= t)][-1])
-    return np.reshape(values, variable.shape)
+def _last(start, steps, time):
+    """The value at a time of an element that begins with one value and takes others at given times."""
+    return [start, *(value for t, value in steps if t <= time)][-1]
+
+
+def _steps(times, held):
+    return lambda t: held[bisect.bisect_right(times, t)]
 
 
 def starts(automaton):
