@@ -13,6 +13,7 @@ from fmu.importer.values import Value
 from fmu.standard.units import base_unit
 from hybrid_model import Automaton, Execution, Solver, ZenoGuard
 from hybrid_model.declare.arguments import require_automaton, require_choice
+from hybrid_model.declare.calls import explained
 from hybrid_model.declare.layout import Layout, layout_of
 from hybrid_model.declare.signals import Inputs
 from hybrid_model.declare.variables import Kind, element_names
@@ -51,6 +52,7 @@ class AutomatonSlave(Slave):
     has_event_mode = True
     can_restore = True
 
+    @explained(CosimError)
     def __init__(self, name: str, automaton: Automaton, solver: Solver | None = None, *, engine: str = "auto") -> None:
         require_choice("engine", engine, ENGINES)
         require_automaton("AutomatonSlave", automaton)

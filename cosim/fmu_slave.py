@@ -15,6 +15,7 @@ from cosim.instances.variables import STRUCTURAL, FmuVariables
 from cosim.slave import Slave
 from fmu.importer.instance import Advance, FmuInstance
 from fmu.importer.values import UnfitError, Value, exact, parsed, require_within
+from hybrid_model.declare.calls import explained
 from hybrid_model.scales import ROUNDINGS
 from hybrid_model.schedule.blocks import Step, Update
 
@@ -51,6 +52,7 @@ class FmuSlave(Slave):
     calls: FmuCalls
     """What calls its functions."""
 
+    @explained(CosimError)
     def __init__(self, name: str, path: str | Path, *, validate: bool = True) -> None:
         self._file = FmuFile(name, path, validate=validate, kind=self.kind)
         description, interface = self._file.description, self._file.interface

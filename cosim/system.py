@@ -12,6 +12,7 @@ from cosim.errors import MisfitError
 from cosim.rounds import reading_round
 from cosim.slave import Port, Slave
 from cosim.sources import Linear, Source
+from hybrid_model.declare.calls import explained
 from hybrid_model.declare.real_numbers import told
 
 SETTLED = 1e-14
@@ -72,6 +73,7 @@ class System:
         continuous signal on a discrete input, or text on an input for numbers.
     """
 
+    @explained(MisfitError)
     def __init__(
         self, slaves: Sequence[Slave], connections: Mapping[str, Source] | None = None, *, loop_iterations: int = 0
     ) -> None:

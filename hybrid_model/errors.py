@@ -29,6 +29,10 @@ class DataError(HybridModelError, ValueError):
     """Data from outside, in a table or a file, are not what they must be."""
 
 
+class MissingFileError(DataError, FileNotFoundError):
+    """A file that is to be read is not there."""
+
+
 class SchedulingError(HybridModelError, RuntimeError):
     """Blocks that meet at events contradict what they announced, or iterate without end."""
 

@@ -19,6 +19,7 @@ from cosim.masters.treatments import with_rollback
 from cosim.replayed_slave import ReplayedSlave
 from cosim.result import CosimResult, Watch
 from cosim.system import System, require_system
+from hybrid_model.declare.calls import explained
 from hybrid_model.schedule.blocks import Termination
 from hybrid_model.schedule.scheduler import Event
 
@@ -39,6 +40,7 @@ SURPRISE = 1e4
 _QUIET, _ROUNDING = 2, 1e-12
 
 
+@explained(CosimError)
 def run_error_controlled(
     system: System,
     t_stop: float,

@@ -13,6 +13,7 @@ from cosim.masters.start import apart_from_the_rest, outputs, require_times, sam
 from cosim.masters.treatments import exactly
 from cosim.result import CosimResult, Watch
 from cosim.system import System, require_system
+from hybrid_model.declare.calls import explained
 from hybrid_model.errors import SchedulingError
 from hybrid_model.schedule.blocks import StiffPart
 from hybrid_model.schedule.scheduler import Scheduler
@@ -24,6 +25,7 @@ ROUNDING = 1e-12
 """Relative rounding of the number of output intervals."""
 
 
+@explained(CosimError)
 @apart_from_the_rest()
 def run_event_exact(
     system: System,

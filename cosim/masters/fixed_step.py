@@ -14,12 +14,14 @@ from cosim.masters.treatments import by_fixed_steps
 from cosim.result import CosimResult, Watch
 from cosim.rounds import Ending, stepping_round
 from cosim.system import System, require_system
+from hybrid_model.declare.calls import explained
 
 ORDERS = ("jacobi", "gauss-seidel")
 ROUNDING = 1e-9
 """Relative rounding of a number of steps."""
 
 
+@explained(CosimError)
 def run_fixed_step(
     system: System,
     t_stop: float,

@@ -6,7 +6,7 @@ import dataclasses
 import difflib
 import functools
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ParamSpec, TypeVar
 
 from hybrid_model.declare.automaton import Automaton
@@ -22,7 +22,7 @@ R = TypeVar("R")
 def explained(
     error_class: type[Exception] = SimulationError, /, **options: type
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return a decorator of a function that runs an automaton: it says what to write in the place of unknown arguments.
+    """Return a decorator of a function or a constructor: it says what to write where arguments are unknown or missing.
 
     Parameters
     ----------
@@ -34,6 +34,7 @@ def explained(
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
         signature = inspect.signature(function)
+        parameters = signature.parameters.values()
 
         @functools.wraps(function)
         def call(*given: P.args, **named: P.kwargs) -> R:
@@ -43,7 +44,10 @@ def explained(
                 # A run costs less than binding its arguments does, so that is done where something is wrong alone.
                 if _fits(signature, given, named):
                     raise
-                raise error_class(_sentence(function.__name__, signature, options, given, named)) from error
+                called, own = function.__name__, 0
+                if called == "__init__":
+                    called, own = type(given[0]).__name__, 1
+                raise error_class(_sentence(called, list(parameters)[own:], options, given[own:], named)) from error
 
         return call
 
@@ -60,26 +64,26 @@ def _fits(signature: inspect.Signature, given: tuple[Any, ...], named: Mapping[s
 
 def _sentence(
     called: str,
-    signature: inspect.Signature,
+    parameters: Sequence[inspect.Parameter],
     options: Mapping[str, type],
     given: tuple[Any, ...],
     named: Mapping[str, Any],
 ) -> str:
-    by_place = [p.name for p in signature.parameters.values() if p.kind is p.POSITIONAL_OR_KEYWORD]
-    by_name = [name for name in signature.parameters if name not in by_place]
+    by_place = [p.name for p in parameters if p.kind is p.POSITIONAL_OR_KEYWORD]
+    by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+    any_more = [f"*{p.name}" for p in parameters if p.kind is p.VAR_POSITIONAL]
     if len(given) > len(by_place):
-        return (
-            f"{called} takes {' and '.join(by_place)} by position, but {len(given)} arguments were given: give the "
-            f"others by name, {'=..., '.join(by_name)}=...."
-        )
+        others = f"give the others by name, {'=..., '.join(by_name)}=..." if by_name else "leave the others out"
+        return f"{called} takes {' and '.join(by_place)} by position, but {len(given)} arguments were given: {others}."
     for name, value in named.items():
-        if name not in signature.parameters:
+        if name not in (*by_place, *by_name):
             owner = given[0] if given else named.get(by_place[0])
-            return f"{called} has no option {name!r}{_instead(name, value, options, owner, by_name)}."
-    missing = [name for name in by_place[len(given) :] if name not in named]
+            return f"{called} has no option {name!r}{_instead(name, value, options, owner, by_name or by_place)}."
+    needed = [p.name for p in parameters if p.default is p.empty]
+    missing = [name for name in by_place[len(given) :] if name in needed and name not in named]
     if not missing:
         return f"{called} was given {by_place[0]} twice: give it by position or by name."
-    return f"{called} needs {' and '.join(missing)}: write {called}({', '.join(by_place)})."
+    return f"{called} needs {' and '.join(missing)}: write {called}({', '.join([*by_place, *any_more])})."
 
 
 def _instead(name: str, value: Any, options: Mapping[str, type], owner: Any, known: list[str]) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from hybrid_model.declare.automaton import Automaton, require_automaton
+from hybrid_model.declare.calls import explained
 from hybrid_model.declare.elements import gathered, require_element, split_element
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.real_numbers import told
@@ -73,6 +74,7 @@ class Composition(Automaton):
         If outputs need each other without a state in between.
     """
 
+    @explained(WiringError)
     def __init__(
         self,
         name: str,

@@ -14,7 +14,7 @@ from hybrid_model.declare.map_results import (
     checked_assignments,
     checked_margin,
     checked_scalar,
-    explain_unwritable,
+    explain,
 )
 from hybrid_model.declare.real_numbers import told
 from hybrid_model.declare.transitions import (
@@ -146,11 +146,10 @@ class HybridAutomaton(Automaton):
         """See `Automaton.derivatives`."""
         states = [v.name for v in self.variables if v.kind is Kind.STATE]
         try:
-            rates = self.flow_map(s)
+            return checked_assignments(self.name, "flow_map", self.flow_map(s), states, states)
         except ValueError as error:
-            explain_unwritable(self.name, "flow_map", error)
+            explain(self.name, type(self), "flow_map", error)
             raise
-        return checked_assignments(self.name, "flow_map", rates, states, states)
 
     def flow_margin(self, s: Values) -> Value:
         """See `Automaton.flow_margin`."""
@@ -178,16 +177,19 @@ class HybridAutomaton(Automaton):
         states = [v.name for v in self.variables if v.kind in (Kind.STATE, Kind.DISCRETE)]
         what = f"the jump map of {transition.name!r}"
         try:
-            new = transition.jump_map(self, s)
+            return checked_assignments(self.name, what, transition.jump_map(self, s), states, [])
         except ValueError as error:
-            explain_unwritable(self.name, what, error)
+            explain(self.name, type(self), what, error)
             raise
-        return checked_assignments(self.name, what, new, states, [])
 
     def output_values(self, s: Values) -> Assignments:
         """See `Automaton.output_values`."""
         declared = [v.name for v in self.variables if v.kind is Kind.OUTPUT]
-        return checked_assignments(self.name, "outputs", self.outputs(s), declared, declared)
+        try:
+            return checked_assignments(self.name, "outputs", self.outputs(s), declared, declared)
+        except ValueError as error:
+            explain(self.name, type(self), "outputs", error)
+            raise
 
     def _collect_transitions(self) -> tuple[Jump | TimeEvent, ...]:
         cls = type(self)

@@ -17,9 +17,31 @@ NO_SYMBOLS = (str, bytes, numbers.Complex, tuple, list, dict, set, type(None), F
 """What a map may return in the place of a number by mistake; anything else can be an expression of a trace."""
 
 
-def explain_unwritable(owner: str, what: str, error: ValueError) -> None:
-    """Say what is wrong if a map has written into what it was given."""
-    if "read-only" in str(error):
+def explain(owner: str, cls: type, what: str, error: ValueError) -> None:
+    """Say what is wrong if a map has written into what it was given, or names a number of the class as a variable.
+
+    Parameters
+    ----------
+    owner, cls
+        The automaton's name, and its class.
+    what : str
+        Which map.
+    error : ValueError
+        What the map raised.
+
+    Raises
+    ------
+    DeclarationError
+        With the remedy, if there is one to be added.
+    """
+    if isinstance(error, DeclarationError):
+        held = vars(cls).get(str(error.name))
+        if isinstance(held, numbers.Real):
+            raise DeclarationError(
+                f"{error} {cls.__name__}.{error.name} = {held!r} is a plain number, no declaration: write "
+                f"{error.name} = hm.State({held!r}), or hm.Parameter({held!r}) for what is fixed in a run."
+            ) from error
+    elif "read-only" in str(error):
         raise DeclarationError(
             f"{what} of {owner} writes into a value that it was given: work on a copy, s.x.copy(), and return that."
         ) from error
@@ -34,7 +56,7 @@ def checked_assignments(
         raise DeclarationError(f"{what} of {owner} returned {values!r}: return a dictionary, name -> value.")
     wrong = [key for key in values if key not in allowed]
     if wrong:
-        raise DeclarationError(f"{what} of {owner} sets {wrong}, but may set only {list(allowed)}.")
+        raise DeclarationError(f"{what} of {owner} sets {wrong}, but may set only {list(allowed)}.", name=wrong[0])
     missing = [key for key in required if key not in values]
     if missing:
         raise DeclarationError(f"{what} of {owner} must also give {missing}.")

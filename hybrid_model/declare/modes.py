@@ -9,7 +9,7 @@ section 1.4.1).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,7 +20,8 @@ from hybrid_model.declare.map_results import checked_assignments, checked_margin
 from hybrid_model.declare.margins import least
 from hybrid_model.declare.signatures import ExplainedCall
 from hybrid_model.declare.transitions import Assignments, Jump, TimeEvent, require_maps
-from hybrid_model.declare.variables import DiscreteState, Value, Values
+from hybrid_model.declare.tuning import named_value
+from hybrid_model.declare.variables import DiscreteState, Kind, Value, Values, Variable
 from hybrid_model.errors import DeclarationError, SimulationError
 
 
@@ -133,9 +134,13 @@ class ModalAutomaton(HybridAutomaton):
             raise DeclarationError(
                 f"{self.name} has the modes {list(self.mode_names)}: declare at least one, and each name once."
             )
-        if isinstance(values.get("mode"), str):
-            values["mode"] = self._index(values["mode"])
+        mode = Variable("mode", Kind.DISCRETE, np.zeros(()), value_names=self.mode_names)
+        if "mode" in values:
+            values["mode"] = named_value(self.name, mode, values["mode"])
         super().__init__(name, **values)
+        self.variables = tuple(
+            replace(v, value_names=self.mode_names) if v.name == "mode" else v for v in self.variables
+        )
 
     @property
     def has_flow_set(self) -> bool:
@@ -156,7 +161,7 @@ class ModalAutomaton(HybridAutomaton):
         return _choose(s.mode, [self._invariant_of(mode, s) for mode in self.modes])
 
     def _flow_of(self, mode: Mode, s: Values) -> Assignments:
-        states = [v.name for v in self.variables if v.kind.name == "STATE"]
+        states = [v.name for v in self.variables if v.kind is Kind.STATE]
         if mode.flow_map is None:
             return {name: 0.0 * s[name] for name in states}
         return checked_assignments(

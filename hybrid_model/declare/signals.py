@@ -32,7 +32,12 @@ class Signal(ExplainedCall):
     value : callable
         ``value(t) -> float or array``, continuous from the right.
     breakpoints : sequence of float
-        Times in s at which it is discontinuous; runs stop there and go on.
+        Times in s at which it is discontinuous, in any order; runs stop there and go on.
+
+    Raises
+    ------
+    DeclarationError
+        If the value is no function of one time, or the breakpoints are no finite times.
     """
 
     value: Callable[[float], npt.ArrayLike]
@@ -40,6 +45,7 @@ class Signal(ExplainedCall):
 
     def __post_init__(self) -> None:
         require_map("value of a Signal", self.value, ("t",))
+        _require_times(self.breakpoints)
 
 
 InputValue = npt.ArrayLike | Callable[[float], npt.ArrayLike] | Signal
@@ -92,7 +98,7 @@ class Inputs:
             elif name not in places:
                 raise DeclarationError(unknown_input(layout.owner, name, places))
             elif isinstance(value, Signal):
-                times = _finite_breakpoints(name, value)
+                times = [float(b) for b in value.breakpoints]
                 self._signals.append((places[name], value.value, tuple(times)))
                 breakpoints += times
             elif callable(value):
@@ -113,10 +119,9 @@ class Inputs:
 
     def _tune(self, place: Place, value: InputValue) -> list[float]:
         """Take what is given for a parameter, and return its breakpoints."""
-        owner, name = self.layout.owner, place.variable.name
-        require_tunable(owner, place.variable, value)
+        require_tunable(self.layout.owner, place.variable, value)
         if isinstance(value, Signal):
-            times = _finite_breakpoints(name, value)
+            times = [float(b) for b in value.breakpoints]
             self._tuned.append((place, Steps(place.variable, value.value, times)))
             return times
         assert not callable(value)
@@ -260,18 +265,13 @@ def unknown_input(owner: str, name: str, known: Mapping[str, object]) -> str:
     return unknown_name(owner, name, known, "input")
 
 
-def _finite_breakpoints(name: str, signal: Signal) -> list[float]:
+def _require_times(given: Sequence[float]) -> None:
     try:
-        breakpoints = real_array(signal.breakpoints)
+        breakpoints = real_array(given)
     except (TypeError, ValueError, OverflowError) as error:
-        raise DeclarationError(
-            f"input {name} has the breakpoints {told(signal.breakpoints)}: give times in s."
-        ) from error
+        raise DeclarationError(f"a Signal has the breakpoints {told(given)}: give times in s.") from error
     if breakpoints.ndim != 1 or not np.isfinite(breakpoints).all():
-        raise DeclarationError(
-            f"input {name} has the breakpoints {told(signal.breakpoints)}: give a sequence of finite times in s."
-        )
-    return [float(b) for b in breakpoints]
+        raise DeclarationError(f"a Signal has the breakpoints {told(given)}: give a sequence of finite times in s.")
 
 
 def sampled_signal(variable: Variable, signal: Callable[[float], npt.ArrayLike], t: float) -> FloatArray:

@@ -99,6 +99,10 @@ class ExplainedCall:
         require_call(f"hm.{cls.__name__}", cls, given, options)
         return super().__new__(cls)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Copies are filled in behind the constructor, so nothing is called that would miss its arguments.
+        return object.__new__, (type(self),), vars(self)
+
 
 def meant(name: str, known: Sequence[str]) -> str:
     """Return the end of a sentence about an unknown name: what was probably meant, or all that there is."""

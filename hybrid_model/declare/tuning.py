@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from hybrid_model.declare.elements import gathered
 from hybrid_model.declare.layout import Layout
+from hybrid_model.declare.real_numbers import is_real, told
 from hybrid_model.declare.variables import FloatArray, Kind, Variable, start_array, unknown_name
 from hybrid_model.errors import DeclarationError, SimulationError
 
@@ -87,6 +88,23 @@ def tuned_value(variable: Variable, given: npt.ArrayLike, what: str = "parameter
     return np.full(variable.size, value) if value.shape == () else value.ravel()
 
 
+def named_value(owner: str, variable: Variable, given: npt.ArrayLike) -> npt.ArrayLike:
+    """Return the value of a variable whose values have names: that of a name, or the given one.
+
+    Raises
+    ------
+    DeclarationError
+        If it is neither a name nor a value that has one.
+    """
+    names = variable.value_names
+    if isinstance(given, str) and given in names:
+        return names.index(given)
+    if isinstance(given, str) or (is_real(given) and given not in range(len(names))):
+        listed = ", ".join(f"{k} {name}" for k, name in enumerate(names))
+        raise DeclarationError(f"{owner} has no {variable.name} {told(given)}; it has {listed}.")
+    return given
+
+
 def start_vectors(layout: Layout, given: Mapping[str, npt.ArrayLike] | None) -> dict[Kind, FloatArray]:
     """Return the start values of states, discrete states, inputs and parameters, with others in place of some.
 
@@ -113,5 +131,7 @@ def start_vectors(layout: Layout, given: Mapping[str, npt.ArrayLike] | None) -> 
             raise DeclarationError(
                 f"starts: {layout.owner}.{name} is computed at the start: give the values that it is computed from."
             )
+        if variable.value_names:
+            value = named_value(layout.owner, variable, value)
         vectors[variable.kind][places[name].at] = tuned_value(variable, value, "start value of")
     return vectors

@@ -65,6 +65,8 @@ class Variable:
         Between them, both included, lie the values that make sense; for people and for importers of an FMU.
     nominal : float or None
         A usual size of the value, above zero, by which solvers can scale.
+    value_names : tuple of str
+        What its values 0, 1, ... are called, where they have names: the modes of a classical automaton.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Variable:
     minimum: float | None = None
     maximum: float | None = None
     nominal: float | None = None
+    value_names: tuple[str, ...] = ()
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -257,6 +260,7 @@ class Declaration(ExplainedCall, ClassAttribute):
             minimum=self.minimum,
             maximum=self.maximum,
             nominal=self.nominal,
+            value_names=(),
         )
 
     def _check_range(self, name: str, start: FloatArray) -> None:
@@ -466,7 +470,7 @@ class Values:
         """Return the value of ``v[1]``; refuse every other name."""
         whole, place = split_element(name) or (name, ())
         if not place or whole not in known:
-            raise DeclarationError(unknown_name(self._owner, name, known))
+            raise DeclarationError(unknown_name(self._owner, name, known), name=name)
         value = self[whole]
         require_element(self._owner, name, whole, place, np.shape(value))
         return value[place]

@@ -12,7 +12,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 
 from hybrid_model.declare.automaton import Automaton
-from hybrid_model.errors import DeclarationError, TraceError
+from hybrid_model.errors import TraceError
 from hybrid_model.native.driven import Driven
 from hybrid_model.native.free_values.snapshots import Snapshot, current, why_untold
 from hybrid_model.native.model_code import run_code
@@ -97,15 +97,14 @@ def traced_maps(automaton: Automaton) -> Trace | NetworkTrace:
     Raises
     ------
     TraceError
-        If they cannot be traced; also for a slip in a map that the run may never call.
+        If they cannot be traced.
+    DeclarationError
+        For a slip in any map: in one, too, that the run may never call.
     """
     taken = current(automaton)
     if taken is not None and isinstance(taken.trace, Trace | NetworkTrace):
         return taken.trace
-    try:
-        return trace_any(automaton)
-    except DeclarationError as error:
-        raise TraceError(str(error)) from error
+    return trace_any(automaton)
 
 
 def kept_trace(automaton: Automaton) -> Trace | NetworkTrace:

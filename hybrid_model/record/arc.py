@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hybrid_model.declare.automaton import Automaton
+from hybrid_model.declare.calls import explained
 from hybrid_model.declare.real_numbers import real_array, told
 from hybrid_model.declare.variables import FloatArray, Kind, Values, Variable, element_names, unknown_name
 from hybrid_model.errors import DataError, DeclarationError
@@ -414,6 +416,7 @@ class HybridArc:
         return int(number)
 
 
+@explained(DataError)
 def load_arc(path: str | Path) -> HybridArc:
     """Read an arc that `HybridArc.save` has written.
 
@@ -433,9 +436,11 @@ def load_arc(path: str | Path) -> HybridArc:
     ------
     DataError
         If the file is no saved arc, is damaged, or has a version of the schema that this package does not know.
-    FileNotFoundError
-        If there is no file.
+    MissingFileError
+        If there is no file; it is a DataError and Python's FileNotFoundError.
     """
+    if not isinstance(path, (str, os.PathLike)):
+        raise DataError(f"load_arc was given {told(path)}: give the path of a file that HybridArc.save has written.")
     return HybridArc(read_record(Path(path)))
 
 

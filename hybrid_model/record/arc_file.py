@@ -19,7 +19,7 @@ import numpy as np
 
 from hybrid_model.declare.transitions import ClockInfo, JumpInfo, Priority, Trigger
 from hybrid_model.declare.variables import FloatArray, Kind, Variable
-from hybrid_model.errors import DataError
+from hybrid_model.errors import DataError, MissingFileError
 from hybrid_model.record.arc_values import ArcValues, LoadedValues
 from hybrid_model.record.flow_piece import FlowPiece
 from hybrid_model.record.flow_record import FlowRecord
@@ -39,6 +39,8 @@ dozen operations, as the dense output itself has."""
 UNREADABLE = (zipfile.BadZipFile, zlib.error, struct.error, OSError, EOFError, ValueError, KeyError, RuntimeError)
 """What the zip and npy readers raise on files that are not theirs or not whole."""
 
+NOT_KEPT = ("kind", "start", "value_names")
+"""What files hold of variables in another way, or not at all."""
 _SAMPLE_READERS = {
     ".csv": "hm.Samples.from_csv",
     ".mat": "scipy.io.loadmat",
@@ -110,8 +112,10 @@ def _content(path: Path) -> Table:
             version = int(file["version"]) if "version" in file else None
             if schema == SCHEMA and version in (1, VERSION):
                 return {name: file[name] for name in file.files}
-    except FileNotFoundError:
-        raise
+    except FileNotFoundError as error:
+        raise MissingFileError(
+            f"there is no file {path}: give the path of one that HybridArc.save has written."
+        ) from error
     except UNREADABLE as error:
         raise DataError(
             f"{path} is no hybrid arc, or is damaged ({error}): give a file that HybridArc.save wrote completely."
@@ -151,7 +155,7 @@ def _about(record: RunRecord) -> dict[str, Any]:
     automaton = record.read.automaton
     variables = []
     for variable in automaton.variables:
-        entry = {key: getattr(variable, key) for key in Variable.__dataclass_fields__ if key not in ("kind", "start")}
+        entry = {key: getattr(variable, key) for key in Variable.__dataclass_fields__ if key not in NOT_KEPT}
         variables.append({**entry, "kind": variable.kind.name, "shape": variable.shape})
     return {
         "automaton": automaton.name,

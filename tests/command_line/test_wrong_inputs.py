@@ -1,5 +1,6 @@
 """At least a hundred mistakes that people make, and the answers that they read: no traceback, the thing, the remedy."""
 
+import math
 import sys
 import tomllib
 import zipfile
@@ -125,6 +126,11 @@ def edited(before, after):
 
 
 ball = BouncingBall()
+
+
+class Heating(hm.ModalAutomaton):
+    x = hm.State(0.0)
+    modes = (hm.Mode("off", lambda self, s: {"x": -1.0}), hm.Mode("on", lambda self, s: {"x": 1.0}))
 
 
 def run():

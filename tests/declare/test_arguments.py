@@ -161,8 +161,6 @@ def test_variables_are_no_options_of_a_run():
         ("on", r"Follower\.u = 'on' is not a number"),
         ("1", r"Follower\.u = '1' is not a number"),
         (None, r"Follower\.u = None is not a number"),
-        (hm.Signal(lambda t: 1.0, 0.5), r"input u has the breakpoints 0\.5: give a sequence of finite times in s"),
-        (hm.Signal(lambda t: 1.0, ["soon"]), r"input u has the breakpoints \['soon'\]: give times in s"),
     ],
 )
 def test_values_of_an_input(value, sentence):

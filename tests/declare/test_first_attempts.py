@@ -164,6 +164,13 @@ def test_a_shape_in_numbers(shape, wanted):
     np.testing.assert_allclose(end, np.broadcast_to([math.exp(-1.0), 2.0 * math.exp(-1.0)], wanted), atol=1e-12)
 
 
+def test_declarations_can_be_copied_and_pickled():
+    for one in (hm.Parameter(2.0, unit="m"), hm.Mode("rest"), hm.Signal(abs, [1.0]), hm.Clock("tick")):
+        for other in (copy.copy(one), copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+            assert type(other) is type(one)
+            assert vars(other) == vars(one)
+
+
 # Instances.
 
 

@@ -118,11 +118,8 @@ def test_maps_of_other_modes_need_not_be_defined_in_a_run():
 @pytest.mark.parametrize(
     ("build", "words"),
     [
-        (lambda: ModalThermostat(mode="idle"), "no mode 'idle'; it has off, on"),
-        (
-            lambda: hm.simulate(ModalThermostat(mode=4), 1.0),
-            "mode = 4 is not the index of a mode; they are 0 off, 1 on",
-        ),
+        (lambda: ModalThermostat(mode="idle"), "no mode 'idle'; it has 0 off, 1 on"),
+        (lambda: ModalThermostat(mode=4), "no mode 4; it has 0 off, 1 on"),
         (lambda: type("Empty", (hm.ModalAutomaton,), {})(), "declare at least one"),
         (
             lambda: type("Twice", (hm.ModalAutomaton,), {"modes": (hm.Mode("a"), hm.Mode("a"))})(),
@@ -152,6 +149,15 @@ def test_maps_of_other_modes_need_not_be_defined_in_a_run():
 def test_mistakes_are_answered_by_name(build, words):
     with pytest.raises(hm.HybridModelError, match=re.escape(words)):
         build()
+
+
+def test_a_run_starts_in_a_mode_by_its_name():
+    both = hm.product("both", ModalThermostat("a"), ModalThermostat("b"))
+    arc = hm.simulate(both, 1.0, starts={"a.mode": "on", "b.mode": 0}, engine="python")
+    assert (arc.at("a.mode", 0.0), arc.at("b.mode", 0.0)) == (1, 0)
+    assert hm.simulate(both, 1.0, starts={"a.mode": "on"}).at("a.mode", 0.0) == 1
+    with pytest.raises(hm.DeclarationError, match=r"^both has no b\.mode 'idle'; it has 0 off, 1 on\.$"):
+        hm.simulate(both, 1.0, starts={"b.mode": "idle"})
 
 
 def test_a_guard_need_not_be_defined_in_other_modes():

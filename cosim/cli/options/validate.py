@@ -44,7 +44,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def require_named(options: argparse.Namespace) -> None:
     """Refuse what is no FMU."""
     if is_code(str(options.fmu)) or options.fmu.suffix.lower() == ".toml":
-        raise UsageError(
-            f"{options.fmu} is no FMU: 'hybrid-fmu export {options.fmu} --out DIR' makes FMUs to be checked."
-        )
+        named = f"{options.fmu}:ClassName" if options.fmu.suffix.lower() == ".py" else options.fmu
+        raise UsageError(f"{options.fmu} is no FMU: 'hybrid-fmu export {named} --out DIR' makes FMUs to be checked.")
     require_file(options.fmu, "an FMU")

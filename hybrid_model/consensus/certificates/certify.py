@@ -20,8 +20,10 @@ from hybrid_model.consensus.certificates.hypotheses import (
 from hybrid_model.consensus.certificates.notes import scenario_notes
 from hybrid_model.consensus.certificates.observation import observe
 from hybrid_model.consensus.graphs.spanning_trees import TreePartition
+from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.runs.report import report_of
 from hybrid_model.consensus.scenario.definition import Scenario, require_scenario
+from hybrid_model.declare.calls import explained
 
 __all__ = ["Certificates", "certify"]
 
@@ -69,6 +71,7 @@ class Certificates:
         return {**table, "pe": dict(self.excitation), "notes": list(self.notes)}
 
 
+@explained(ScenarioError)
 def certify(
     scenario: Scenario,
     arc: HybridArc | NetworkRun | None = None,

@@ -17,6 +17,7 @@ from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind
 from hybrid_model.consensus.weights.function import FunctionWeight, TimeFunction
 from hybrid_model.consensus.weights.kinds import weights_block
 from hybrid_model.consensus.weights.waveform import Waveform
+from hybrid_model.declare.calls import explained
 
 Recipe = tuple[object, Callable[[], Any]]
 """What decides about a part, as data that compare equal or do not, and what makes the part, or None for no part."""
@@ -75,6 +76,7 @@ def broadcast_wires(scenario: Scenario) -> dict[str, list[str]]:
     return wires
 
 
+@explained(ScenarioError)
 def closed_loop(
     scenario: Scenario,
     *,

@@ -9,7 +9,9 @@ import numpy as np
 
 from hybrid_model import HybridArc, NetworkRun
 from hybrid_model.consensus.laws.closed_loop import agent_name
+from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario, require_scenario
+from hybrid_model.declare.calls import explained
 from hybrid_model.declare.variables import FloatArray
 
 
@@ -65,6 +67,7 @@ class RunReport:
         }
 
 
+@explained(ScenarioError)
 def run_report(scenario: Scenario, arc: HybridArc) -> RunReport:
     """Take the figures of a run of a scenario's closed loop.
 

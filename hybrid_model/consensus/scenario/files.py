@@ -18,6 +18,7 @@ from hybrid_model.consensus.scenario.sources import preset_names, scenario_sourc
 from hybrid_model.consensus.scenario.trigger import Trigger, TriggerKind, trigger_keys
 from hybrid_model.consensus.switching.base import NoSwitching, Switching
 from hybrid_model.consensus.weights.kinds import read_weights
+from hybrid_model.declare.calls import explained
 
 __all__ = ["load_scenario", "read_scenario", "scenario_entries"]
 
@@ -26,6 +27,7 @@ CHANNEL_KEYS = ("delay", "loss", "seed", "slots")
 MOST_CHANGES = 1e7
 
 
+@explained(ScenarioError)
 def load_scenario(name_or_path: str | os.PathLike[str]) -> Scenario:
     """Load a preset by its name or a scenario file by its path.
 
@@ -86,6 +88,7 @@ def _with_other_trigger(name_or_path: str | os.PathLike[str]) -> tuple[str, Trig
     return base, TriggerKind(kind)
 
 
+@explained(ScenarioError)
 def read_scenario(entries: Mapping[str, Any], folder: str | os.PathLike[str] = ".") -> Scenario:
     """Build a scenario from the parsed entries of a scenario file.
 

@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 from hybrid_model.consensus.certificates.forms import BOUNDS
+from hybrid_model.consensus.entries import suggestion
 from hybrid_model.consensus.messages import ScenarioError
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.files import read_scenario, scenario_entries
@@ -109,7 +110,9 @@ class Study:
         """Choose the points."""
         unknown = next((name for name in self.frame.bounds if name not in BOUND_NAMES), None)
         if unknown is not None:
-            raise SweepError(f"there is no bound '{unknown}'; there are {', '.join(BOUND_NAMES)}.")
+            raise SweepError(
+                f"there is no bound '{unknown}'.{suggestion(unknown, BOUND_NAMES)} Bounds: {', '.join(BOUND_NAMES)}."
+            )
         if self.frame.max_jumps < 1:
             raise SweepError(f"max_jumps is {self.frame.max_jumps}; give a whole number of jumps, 1 or more.")
         points = points_of(self.axes, self.design, self.runs, self.repeats, self.seed)

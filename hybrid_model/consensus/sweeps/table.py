@@ -72,7 +72,8 @@ class SweepTable:
             other = next((key for key in given if kept.get(key) != given[key]), None)
             if other is not None:
                 raise SweepError(
-                    f"{self.path} holds another sweep, with another entry '{other}'. Name another file, or delete it."
+                    f"{self.path} holds another sweep, with another entry '{other}'. Name another file, on the command "
+                    "line by --table, or delete it."
                 )
         return study or Study.from_dict(kept)
 

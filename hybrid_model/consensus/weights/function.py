@@ -135,7 +135,7 @@ class FunctionWeight(Waveform):
     Raises
     ------
     ScenarioError
-        If it is no function.
+        If it is no function, or none that takes arrays.
     ValueError
         If the function is negative by more than rounding, not finite or not periodic at one of the times at which this
         is tried out, or the kinks do not ascend within one period.
@@ -156,7 +156,7 @@ class FunctionWeight(Waveform):
             check_rows(self.kinks, self.period, ("kinks", "period"))
         span = self.period if self.period is not None else _TRIED
         times = np.linspace(0.0, span, _CHECKS)
-        values = self.carrier.raw(times)
+        values = self._tried(times)
         rounding = _ROUNDING * float(np.max(np.abs(values)))
         for time, value in zip(times.tolist(), values.tolist(), strict=True):
             require(f"the weight at t = {time:.6g}", value, value >= -rounding, "must not be negative")
@@ -169,6 +169,15 @@ class FunctionWeight(Waveform):
                     f"period is {self.period}, but the weight is {float(values[wrong.argmax()]):.9g} at t = {time:.6g} "
                     f"and {float(later[wrong.argmax()]):.9g} one period later; give a period of the function, or none."
                 )
+
+    def _tried(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        try:
+            return np.asarray(self.carrier.raw(times))
+        except (TypeError, ValueError) as error:
+            raise ScenarioError(
+                f"the weight is no function in numpy style ({error}): it is called with arrays of times, so write "
+                "np.sin, np.where, ... in the place of math.sin and if."
+            ) from error
 
     @cached_property
     def carrier(self) -> FunctionCarrier:

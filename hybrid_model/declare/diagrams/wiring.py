@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hybrid_model.declare.automaton import Automaton, require_automaton
+from hybrid_model.declare.calls import explained
 from hybrid_model.declare.composition import Composition, Source
 from hybrid_model.declare.diagrams.operators import in_feedback, in_parallel, in_series
 from hybrid_model.declare.real_numbers import told
 from hybrid_model.errors import WiringError
 
 
+@explained(WiringError)
 def product(name: str, *parts: Automaton) -> Composition:
     """Compose parts that do not see each other, under their own names.
 
@@ -29,6 +31,7 @@ def product(name: str, *parts: Automaton) -> Composition:
     return Composition(name, _by_name(name, parts))
 
 
+@explained(WiringError)
 def series(name: str, first: Automaton, second: Automaton, connections: Mapping[str, str] | None = None) -> Composition:
     """Compose two parts of which the first drives the second.
 
@@ -53,6 +56,7 @@ def series(name: str, first: Automaton, second: Automaton, connections: Mapping[
     return Composition(name, parts, _wires(name, second, first, connections))
 
 
+@explained(WiringError)
 def parallel(name: str, first: Automaton, second: Automaton) -> Composition:
     """Compose two parts that have the same inputs and whose outputs are added, as ``first + second`` does.
 
@@ -72,6 +76,7 @@ def parallel(name: str, first: Automaton, second: Automaton) -> Composition:
     return in_parallel(name, first, second)
 
 
+@explained(WiringError)
 def feedback(
     name: str,
     plant: Automaton,
