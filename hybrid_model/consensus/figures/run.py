@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +28,9 @@ from hybrid_model.consensus.figures.style import (
     row_step,
     save_figures,
 )
+from hybrid_model.consensus.graphs.undirected import incidence
 from hybrid_model.consensus.laws.closed_loop import agent_name
+from hybrid_model.consensus.runs.metrics import disagreement
 from hybrid_model.consensus.runs.report import edge_norm
 from hybrid_model.consensus.scenario.definition import Scenario
 from hybrid_model.consensus.scenario.trigger import Trigger
@@ -84,9 +87,8 @@ def plot_edge_norm(
 ) -> Axes:
     """Draw the norm of the edge states with its bounds, on a logarithmic axis (paper, figures 4 and 6).
 
-    Of what is certified these are drawn: what a start leaves, ``m exp(-rate t) ||x_e(0)||`` with Floquet's rate and its
-    factor m, plus what errors do from then on, the exact radius or that by energy, with the decay of the threshold
-    (docs/paper-audit.md, sections 5.3 and 7). Bounds along a tree that lie far above the run are words in the legend.
+    Of what is certified `certified_curves` are drawn; those and bounds along a tree that lie far above the run are
+    words in the legend.
 
     Parameters
     ----------
@@ -107,38 +109,41 @@ def plot_edge_norm(
     norm = edge_norm(scenario, np.array([first, *others]))
     ax.semilogy(times, norm, color="k", label=r"$\|x_e(t)\|$")
     grid = np.linspace(0.0, scenario.stop_time, 300)
-    missing = []
-    curves = certified_curves(found, float(norm[0]), grid)
-    if found is not None and not curves:
-        is_without_period = found.value(Quantity.RATE, Form.FLOQUET) is None
-        why = "no bound: weights without a period" if is_without_period else "no exact bound"
-        missing.append(Line2D([], [], linestyle="none", label=why))
-    for form, values in curves.items():
-        ax.semilogy(grid, values, color=FORMS[form]["color"], linestyle=_EDGE_LINES[form], label=f"{form} bound")
+    curves = certified_curves(found, grid)
+    words = ["no certified bound"] if found is not None and not curves else []
+    drawn: dict[str, tuple[FloatArray, dict[str, Any]]] = {
+        form: (values, {"color": FORMS[form]["color"], "linestyle": _EDGE_LINES[form]})
+        for form, values in curves.items()
+    }
     for bound in bounds:
-        look = {key: FORMS[bound.form.value][key] for key in ("color", "linestyle")}
         if bound.kappa2 is None:
-            missing.append(Line2D([], [], linestyle="none", label=f"no {bound.form.value} bound"))
-        elif found is not None and bound.at(grid).min() > FAR * norm.max():
-            power = int(np.log10(bound.at(grid).min()))
-            missing.append(Line2D([], [], linestyle="none", label=rf"{bound.form.value} bound $> 10^{{{power}}}$"))
+            words.append(f"no {bound.form.value} bound")
         else:
-            ax.semilogy(grid, bound.at(grid), **look, label=f"{bound.form.value} bound")
+            look = {key: FORMS[bound.form.value][key] for key in ("color", "linestyle")}
+            drawn[bound.form.value] = bound.at(grid), look
+    for form, (values, look) in drawn.items():
+        if found is not None and values.min() > FAR * norm.max():
+            words.append(rf"{form} bound $> 10^{{{int(np.log10(values.min()))}}}$")
+        else:
+            ax.semilogy(grid, values, **look, label=f"{form} bound")
     ax.set_ylabel(r"norm of edge states $\|x_e\|$")
     over_time(ax, scenario)
-    legend_above(ax, missing)
+    legend_above(ax, [Line2D([], [], linestyle="none", label=text) for text in words])
     return ax
 
 
-def certified_curves(found: Certificates | None, start: float, t: FloatArray) -> dict[Form, FloatArray]:
+def certified_curves(found: Certificates | None, t: FloatArray) -> dict[Form, FloatArray]:
     """Return the bounds on ``||x_e(t)||`` that hold from the start on, by the form of their radius.
+
+    What a start leaves is at most ``m exp(-rate t) ||D'|| ||xi(0)||``, with Floquet's rate and its factor m or the
+    improved ones, which are factors of the norm of xi: the norm of x_e itself may grow at first. What errors do from
+    the start on is at most the exact radius, or that by energy, with the decay of the threshold (docs/paper-audit.md,
+    sections 3, 5.3 and 7).
 
     Parameters
     ----------
     found : Certificates, optional
         Of a scenario; without one, or where it lacks a number, there is no bound.
-    start : float
-        ``||x_e(0)||``.
     t : array, shape (n,)
         Times in s.
 
@@ -149,12 +154,19 @@ def certified_curves(found: Certificates | None, start: float, t: FloatArray) ->
     """
     if found is None:
         return {}
-    rate, factor = (found.value(quantity, Form.FLOQUET) for quantity in (Quantity.RATE, Quantity.TRANSIENT))
-    if rate is None or factor is None:
+    network = found.scenario.network
+    start = np.linalg.norm(incidence(network.agents, network.underlying_edges), 2) * disagreement(
+        np.array(network.initial)
+    )
+    left = np.full(len(t), np.inf)
+    for form in (Form.FLOQUET, Form.IMPROVED):
+        rate, factor = (found.value(quantity, form) for quantity in (Quantity.RATE, Quantity.TRANSIENT))
+        if rate is not None and factor is not None:
+            left = np.minimum(left, factor * start * np.exp(-rate * t))
+    if not np.isfinite(left).all():
         return {}
     decay = slowest_decay(found.scenario)
     radii = {form: found.value(Quantity.RADIUS, form) for form in (Form.EXACT, Form.ENERGY)}
-    left = factor * start * np.exp(-rate * t)
     return {form: left + radius * np.exp(-decay * t) for form, radius in radii.items() if radius is not None}
 
 

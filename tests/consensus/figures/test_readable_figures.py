@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+import tomllib
 from functools import partial
 from itertools import pairwise
 
@@ -11,7 +12,7 @@ import pytest
 from PIL import Image
 
 import hybrid_model as hm
-from hybrid_model.consensus import closed_loop, load_scenario, run_report
+from hybrid_model.consensus import closed_loop, load_scenario, read_scenario, run_report
 from hybrid_model.consensus.certificates.certify import certify
 from hybrid_model.consensus.certificates.forms import Form
 from hybrid_model.consensus.figures import animation
@@ -20,6 +21,7 @@ from hybrid_model.consensus.figures.details import MOST_AXES, plot_gaps_against_
 from hybrid_model.consensus.figures.run import certified_curves, plot_broadcasts, plot_edge_norm
 from hybrid_model.consensus.figures.style import PAGE, height_of, in_column, row_step, save_figures
 from hybrid_model.consensus.runs.report import edge_norm
+from hybrid_model.consensus.scenario.files import scenario_entries
 from hybrid_model.errors import DataError
 from hybrid_model.plots import JOURNAL, plot_raster
 
@@ -45,7 +47,7 @@ def test_bounds_from_the_start_on_hold_along_the_run(paper, ax):
     scenario, arc, found = paper
     t = np.linspace(0.0, scenario.stop_time, 2001)
     norm = edge_norm(scenario, np.array([arc.at(f"agent{i}.x", t) for i in (1, 2, 3, 4)]))
-    curves = certified_curves(found, float(norm[0]), t)
+    curves = certified_curves(found, t)
     assert list(curves) == [Form.EXACT, Form.ENERGY]
     assert (norm <= curves[Form.EXACT]).all()
     assert (curves[Form.EXACT] <= curves[Form.ENERGY]).all()
@@ -53,6 +55,38 @@ def test_bounds_from_the_start_on_hold_along_the_run(paper, ax):
     assert curves[Form.EXACT][-1] < 0.1 * norm[0]
     plot_edge_norm(scenario, arc, ax=ax, found=found)
     assert [text.get_text() for text in ax.get_legend().get_texts()][1:] == ["exact bound", "energy bound"]
+
+
+def test_edge_states_that_grow_at_first_stay_below_what_is_drawn():
+    """Two edges of weights far apart: the fast one relaxes by moving the slow one."""
+    toml = """
+        name = "apart"
+        stop_time = 2.0
+        network = { agents = 3, edges = [[1, 2], [2, 3]], initial = [0.0, 3.0, 4.0] }
+        weights = { kind = "constant", value = [0.01, 10.0] }
+        trigger = { kind = "static", threshold = 1e-4 }
+    """
+    scenario = read_scenario(tomllib.loads(toml))
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
+    t = np.linspace(0.0, scenario.stop_time, 201)
+    norm = edge_norm(scenario, np.array([arc.at(f"agent{i}.x", t) for i in (1, 2, 3)]))
+    assert norm.max() > 1.05 * norm[0]
+    curves = certified_curves(certify(scenario), t)
+    assert list(curves) == [Form.EXACT, Form.ENERGY]
+    for values in curves.values():
+        assert (norm <= values).all()
+
+
+def test_weights_without_a_period_have_the_bounds_that_there_are(ax):
+    entries, _ = scenario_entries("paper-a")
+    drawn = {"kind": "random-dwell", "active": [[1, 2], [2, 3], [1, 3]], "shortest": 0.3, "longest": 0.9, "seed": 5}
+    scenario = read_scenario({**entries, "stop_time": 10.0, "switching": drawn})
+    arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
+    found = certify(scenario, arc)
+    assert found.value("rate", "floquet") is None
+    plot_edge_norm(scenario, arc, ax=ax, found=found)
+    told = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert "exact bound" in told
 
 
 def test_two_broadcasts_a_tenth_of_a_second_apart_stay_two(ax):

@@ -178,7 +178,7 @@ def test_promises_give_the_bounds_of_a_law_that_keeps_the_same():
     constants = [next(note for note in found.notes if "C = 2 c" in note) for found in (known, promised)]
     assert constants[1] == constants[0]
     t = np.linspace(0.0, 50.0, 5)
-    curves = [certified_curves(found, 1.0, t) for found in (known, promised)]
+    curves = [certified_curves(found, t) for found in (known, promised)]
     for form, values in curves[0].items():
         np.testing.assert_allclose(curves[1][form], values, rtol=1e-12)
     assert curves[0]
