@@ -172,6 +172,9 @@ def test_runs_without_states_or_without_jumps_are_saved(again):
     class Rest(hm.HybridAutomaton):
         x = hm.State([])
 
+        def flow_map(self, s):
+            return {"x": s.x}
+
     for automaton in (Still(), Rest(), BouncingBall(h=100.0)):
         arc = hm.simulate(automaton, 1.0)
         assert_same(arc, again(arc))
