@@ -9,6 +9,7 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter, MaxNLocator
@@ -52,6 +53,8 @@ _MAP = "cividis"
 _WIDE = 30.0
 """A ratio of values from which on their logarithms are shown."""
 _LINES = 5
+_TICKS = 6
+"""Most ticks on an axis of a map."""
 _PANELS = 3
 
 
@@ -101,7 +104,8 @@ def plot_heat_map(
     wide = bool(known.min() > 0 and known.max() > _WIDE * known.min())
     norm = LogNorm(known.min(), known.max()) if wide else Normalize(known.min(), known.max())
     across, up = (np.unique([point[k] for point in points]) for k in (0, 1))
-    if len(points) == len(across) * len(up) and min(len(across), len(up)) > 1:
+    on_grid = len(points) == len(across) * len(up) and min(len(across), len(up)) > 1
+    if on_grid:
         mesh = _cells(ax, points, across, up, norm)
     else:
         xs, ys = np.array(list(points)).T
@@ -109,9 +113,11 @@ def plot_heat_map(
         mesh = ax.scatter(xs, ys, c=values, cmap=_MAP, norm=norm, s=9, linewidths=0)
         gone = ~np.isfinite(values)
         ax.plot(xs[gone], ys[gone], "x", color="0.4", markersize=3)
-    for scale, places in ((ax.set_xscale, across), (ax.set_yscale, up)):
+    for scale, axis, places in ((ax.set_xscale, ax.xaxis, across), (ax.set_yscale, ax.yaxis, up)):
         if _is_geometric(places):
             scale("log")
+        if on_grid:
+            _mark_places(axis, places)
     ax.set_xlabel(label_of(chosen[0]))
     ax.set_ylabel(label_of(chosen[1]))
     bar = ax.figure.colorbar(mesh, ax=ax, pad=0.02)
@@ -120,11 +126,18 @@ def plot_heat_map(
     return ax
 
 
+def _mark_places(axis: Axis, places: NDArray[Any]) -> None:
+    """Set ticks where there are runs: cells reach half a step beyond, where a tick would be a value that none has."""
+    shown = places[:: -(-len(places) // _TICKS)]
+    axis.set_ticks(shown, [f"{place:.3g}" for place in shown])
+    axis.set_ticks([], minor=True)
+
+
 def _cells(
     ax: Axes, points: dict[tuple[float, ...], float], across: NDArray[Any], up: NDArray[Any], norm: Normalize
 ) -> Any:
     table = np.array([[points[a, b] for a in across.tolist()] for b in up.tolist()])
-    mesh = ax.pcolormesh(across, up, np.ma.masked_invalid(table), cmap=_MAP, norm=norm, shading="nearest")
+    mesh = ax.pcolormesh(_edges(across), _edges(up), np.ma.masked_invalid(table), cmap=_MAP, norm=norm)
     # Drawn as one picture: files with ten thousand cells are large, and viewers show seams between them.
     mesh.set_rasterized(True)
     gone = np.argwhere(~np.isfinite(table))
@@ -313,6 +326,14 @@ def _is_geometric(places: NDArray[Any]) -> bool:
         return False
     ratios = places[1:] / places[:-1]
     return bool(np.allclose(ratios, ratios[0], rtol=1e-6))
+
+
+def _edges(places: NDArray[Any]) -> NDArray[Any]:
+    """Return where cells round places on an axis begin and end: halfway, on the scale that the axis has."""
+    if _is_geometric(places):
+        return np.asarray(np.exp(_edges(np.log(places))))
+    halves = np.diff(places) / 2
+    return np.concatenate([[places[0] - halves[0]], places[:-1] + halves, [places[-1] + halves[-1]]])
 
 
 def _shown(values: NDArray[Any]) -> str:

@@ -62,6 +62,17 @@ def test_a_map_has_the_values_of_the_grid_where_they_belong(table):
     assert pytest.approx(shown) == np.asarray(turned.collections[0].get_array()).reshape(6, 4).T
 
 
+def test_ticks_of_a_map_stand_where_there_are_runs(table):
+    ax = plot_heat_map(table(["trigger.threshold=0.1:1:6:log", "trigger.decay=0:0.048:13"]), "events")
+    np.testing.assert_allclose(ax.get_xticks(), np.geomspace(0.1, 1, 6), rtol=1e-12)
+    np.testing.assert_allclose(ax.get_yticks(), np.linspace(0, 0.048, 13)[::3], atol=1e-15)
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["0", "0.012", "0.024", "0.036", "0.048"]
+    assert ax.get_xticks(minor=True).size == 0
+    # Each in the middle of its cell, as the axis shows it.
+    edges = np.log(ax.collections[0].get_coordinates()[0, :, 0])
+    np.testing.assert_allclose((edges[1:] + edges[:-1]) / 2, np.log(np.geomspace(0.1, 1, 6)), atol=1e-12)
+
+
 def test_points_without_a_value_are_crossed_out(table):
     ax = plot_heat_map(table(AXES), "gap_min")
     crosses = ax.lines[0]
