@@ -30,32 +30,40 @@ def defined(tree):
     }
 
 
-def second_doors(modules, users):
-    """Names that users, trees by file, take from modules, trees by dotted name, that do not define them."""
-    own = {module: defined(tree) for module, tree in modules.items()}
+def taken(tree):
+    """The modules and names that a file takes by `from ... import`."""
     return [
-        (file, node.module, alias.name)
-        for file, tree in users.items()
+        (node.module, alias.name)
         for node in statements(tree)
-        if isinstance(node, ast.ImportFrom) and node.module in own
+        if isinstance(node, ast.ImportFrom)
         for alias in node.names
-        if alias.name not in own[node.module]
+    ]
+
+
+def second_doors(own, users):
+    """Names that users, what they take by file, take from modules, their own names by dotted name, not their own."""
+    return [
+        (file, module, name)
+        for file, pairs in users.items()
+        for module, name in pairs
+        if module in own and name not in own[module]
     ]
 
 
 def test_names_are_imported_from_where_they_are_defined():
-    folders = [ROOT / name for name in (*PACKAGES, "tests")]
-    trees = {file: ast.parse(file.read_text(encoding="utf-8")) for folder in folders for file in folder.rglob("*.py")}
-    modules = {
-        ".".join(file.relative_to(ROOT).with_suffix("").parts): tree
-        for file, tree in trees.items()
-        if file.name != "__init__.py" and file.relative_to(ROOT).parts[0] in PACKAGES
-    }
-    assert len(modules) > 200
-    assert second_doors(modules, trees) == []
+    own, users = {}, {}
+    for file in (file for name in (*PACKAGES, "tests") for file in (ROOT / name).rglob("*.py")):
+        # One tree at a time: many together keep the collector of garbage busy.
+        tree = ast.parse(file.read_text(encoding="utf-8"))
+        users[file] = taken(tree)
+        parts = file.relative_to(ROOT).with_suffix("").parts
+        if file.name != "__init__.py" and parts[0] in PACKAGES:
+            own[".".join(parts)] = defined(tree)
+    assert len(own) > 200
+    assert second_doors(own, users) == []
 
 
 def test_a_second_door_is_noticed():
-    modules = {"house": ast.parse("from street import key\ndoor = key")}
-    users = {"guest.py": ast.parse("from house import door, key")}
-    assert second_doors(modules, users) == [("guest.py", "house", "key")]
+    own = {"house": defined(ast.parse("from street import key\ndoor = key"))}
+    users = {"guest.py": taken(ast.parse("from house import door, key"))}
+    assert second_doors(own, users) == [("guest.py", "house", "key")]
