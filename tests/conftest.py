@@ -65,6 +65,22 @@ def forget_models():
     return forget
 
 
+def once(path, make):
+    """Make a file once for all processes of a run: whoever makes the claim makes it, the others wait for it."""
+    claim = path.with_name(f"{path.name}.claim")
+    while not path.exists():
+        try:
+            claim.mkdir()
+        except FileExistsError:
+            time.sleep(0.05)
+            continue
+        try:
+            make()
+        finally:
+            claim.rmdir()
+    return path
+
+
 @pytest.fixture(scope="session")
 def exported(tmp_path_factory, run_folder):
     """Export an automaton once a session, key and version, whatever the number of test processes."""
@@ -74,19 +90,15 @@ def exported(tmp_path_factory, run_folder):
         key = (key or automaton.name) + ("" if fmi == "3.0" else f"-fmi{fmi}") + ("" if clocks else "-no-clocks")
         folder = run_folder / "fmus" / fingerprint(automaton)
         folder.mkdir(parents=True, exist_ok=True)
-        path, claim = folder / f"{key}.fmu", folder / f"{key}.claim"
-        while not path.exists():
-            try:
-                # Whoever makes the claim makes the FMU; the others wait for it.
-                claim.mkdir()
-            except FileExistsError:
-                time.sleep(0.05)
-                continue
-            try:
-                os.replace(export_fmu(automaton, own / f"{key}.fmu", fmi=fmi, clocks=clocks), path)
-            finally:
-                claim.rmdir()
-        return path
+        path = folder / f"{key}.fmu"
+
+        def make():
+            os.replace(export_fmu(automaton, own / f"{key}.fmu", fmi=fmi, clocks=clocks), path)
+
+        # The first export of a version compiles what all of them share.
+        shared = run_folder / f"objects-{fmi}"
+        once(shared, lambda: (once(path, make), shared.touch()))
+        return once(path, make)
 
     return export
 
