@@ -79,7 +79,7 @@ def require_the_closed_loops_run(scenario, limit=1e-9):
         ("gated-sine", "dynamic", CYCLE),
         ("sine", "dynamic", SEQUENCE | CHANNEL),
         ("gated-sine", "self-triggered", CYCLE),
-        ("sine", "self-triggered", {}),
+        pytest.param("sine", "self-triggered", {}, marks=pytest.mark.long),
         ("piecewise", "dynamic", CHANNEL),
         ("sampled", "dynamic", SEQUENCE),
     ],
