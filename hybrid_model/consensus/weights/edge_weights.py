@@ -184,4 +184,5 @@ def _masked_integral(
         index = np.clip(np.searchsorted(cuts, t, side="right") - 1, 0, len(mask) - 1)
         return np.asarray(before[index] + mask[index] * waveform.integral(cuts[index], t))
 
-    return primitive(end) - primitive(begin)
+    below, above = primitive(np.stack((begin, end)))
+    return np.asarray(above - below)

@@ -137,7 +137,8 @@ class Gate:
         if begin.size == 0:
             return np.zeros(begin.shape)
         first, last = float(min(begin.min(), end.min())), float(max(begin.max(), end.max()))
-        windows = np.arange(self._window(first), self._window(last) + 1)
+        lowest, highest = self._window(np.array([first, last]))
+        windows = np.arange(lowest, highest + 1)
         # Cutting the first window at the earliest time makes its primitive zero there: a scalar integral is then one
         # sum of positive terms, with no difference of two large numbers.
         opens = np.maximum(self.boundary(2 * windows - 1), first)
@@ -149,7 +150,8 @@ class Gate:
             within = np.clip(t, opens[index], closes[index])
             return np.asarray(before[index] + carrier.integral(opens[index], within))
 
-        return primitive(end) - primitive(begin)
+        below, above = primitive(np.stack((begin, end)))
+        return np.asarray(above - below)
 
     def _window(self, t: Any) -> Any:
         return np.floor(self.segment(t) / 2)
