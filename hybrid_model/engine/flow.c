@@ -97,21 +97,9 @@ static FlowEnd go_on_to(Engine *engine, const Point *point, double time_event)
     return FLOW_REACHED;
 }
 
-/* Whether a guard counts as crossed from below zero on. */
-static bool levels_are_raised(const Engine *engine, const Point *point)
-{
-    size_t i = 0;
-    while (i <= engine->model->n_margins && point->level[i] == 0.0)
-        i++;
-    return i <= engine->model->n_margins;
-}
-
 FlowEnd engine_flow(Engine *engine, const Point *point, double limit, bool locate, size_t *budget)
 {
-    for (FlowEnd result = FLOW_EVENT;;) {
-        /* What happens where steps end is seen by whoever goes on from there, but for what this step has raised. */
-        if (result == FLOW_REACHED && *budget == 0 && *point->time < limit && !levels_are_raised(engine, point))
-            return FLOW_BUDGET;
+    for (;;) {
         size_t jump = engine->model->n_jumps;
         if (!engine_take_internal_jumps(engine, point) || (locate && !engine_first_enabled(engine, point, &jump)))
             return FLOW_PROBLEM;
@@ -120,7 +108,7 @@ FlowEnd engine_flow(Engine *engine, const Point *point, double limit, bool locat
         if (*point->time >= limit)
             return FLOW_REACHED;
         double piece_end = fmin(engine_next_time(engine, point, locate, true), engine->options.barrier); /* line 11 */
-        result = flow_piece(engine, point, limit, piece_end, locate, budget);
+        FlowEnd result = flow_piece(engine, point, limit, piece_end, locate, budget);
         bool near = piece_end <= limit && piece_end - *point->time <= engine_one_instant(engine, piece_end);
         if (result == FLOW_EVENT && near && *point->time < piece_end) /* line 15 */
             result = go_on_to(engine, point, piece_end);
