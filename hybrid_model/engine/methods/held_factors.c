@@ -22,6 +22,8 @@ enum { BEGIN, END, TERMS, KEYS };
 #define MOST_TRIALS 12
 /* A piece is no longer than so many times the one before. */
 #define LONGER 10.0
+/* From one term to the next those of smooth functions fall by that at least, where a piece is as long as they allow. */
+#define FALLS 0.03
 /* Sums of series may be larger than the states by that: what cancels in them shows as rounding. */
 #define MOST_CANCELLED 100.0
 /* Rounding decides about shorter pieces. */
@@ -251,6 +253,17 @@ static void sum_series(Engine *engine, const Point *point, const double *row, do
             vectors[k * n + i] = sums[N_SERIES * i + k];
 }
 
+/* The size of the last two terms of the rates of state i, integrated: what cancels in the sum of all functions is not
+   neglected; of what follows less is left, in which nothing need cancel. */
+static double tail_of(const Step *step, size_t n, size_t i, double whole)
+{
+    double tail = 0.0;
+    size_t degree = step->n_terms > N_SERIES - FINEST / COARSE ? FINEST : FINEST / COARSE;
+    for (size_t k = degree; k <= degree + 1; k++)
+        tail += 2.0 * (double)k * fabs(step->vectors[k * n + i]);
+    return fmax(tail, FALLS * whole);
+}
+
 /* Lets the series begin with the states of the step, and gives its end; whether it is as exact as a step must be. */
 static bool place_states(Engine *engine, const Point *point, const double *tails)
 {
@@ -268,7 +281,7 @@ static bool place_states(Engine *engine, const Point *point, const double *tails
         double moves = 0.0, size = fmax(fabs(step->x0[i]), fabs(step->x1[i]));
         for (size_t k = 1; k < step->n_terms; k++)
             moves += fabs(step->vectors[k * n + i]);
-        bool exact = tails[i] <= engine_error_scale(engine, point, i, size) &&
+        bool exact = tail_of(step, n, i, tails[i]) <= engine_error_scale(engine, point, i, size) &&
                      moves <= MOST_CANCELLED * engine_state_size(engine, point, i, size);
         if (!exact || !isfinite(step->x1[i]))
             return false;
