@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +73,13 @@ class FmuSlave(Slave):
         self.stops_after_events = self._file.stops_after_events
         self.default_start_time, self.default_stop_time = self._file.start_time, self._file.stop_time
         self.default_step, self.internal_step = self._file.step, self._file.internal_step
+        follows = bool(getattr(interface, "canInterpolateInputs", False))
+        self.interpolating = self._variables.flowing("input") if follows else ()
+        derives = int(getattr(interface, "maxOutputDerivativeOrder", 0) or 0) > 0
+        self.sloped = self._variables.smooth_outputs(description.outputs or ()) if derives else ()
+        self._lines: dict[str, tuple[float, float]] = {}
+        self._led: list[str] = []
+        self._give_slopes: Callable[[list[float]], None] | None = None
         self.calls = FmuCalls(name)
         self._access: FmuAccess | None = None
         self._do_step: Callable[[float, float], Advance | None] = self._first_step
@@ -197,10 +204,11 @@ class FmuSlave(Slave):
     def step(self, t: float, t_next: float) -> Step:
         """See `Block.step`."""
         size = t_next - t if self.variable_step else self._size(t_next - t)
+        lines, self._lines = self._lines, {}
         told = self._do_step(t, size)
         # Ours say at the end of a step that they have an event there; what they announce may be as far as they look.
         self._idle = self.foresees and (told is None or not told.event)
-        return Step(t_next, False) if told is None else self._carry_on(t, t_next, told)
+        return Step(t_next, False) if told is None else self._carry_on(t, t_next, told, lines)
 
     @property
     def steps_by_one_call(self) -> bool:
@@ -211,8 +219,26 @@ class FmuSlave(Slave):
         """Return what a step gave that somebody else called DoStep for, and carry it on."""
         return self._carry_on(t, t_next, self.calls.answer(self._instance.answered, t, status, told))
 
-    def _carry_on(self, t: float, t_next: float, told: Advance | None) -> Step:
+    def slopes(self, names: Sequence[str]) -> Callable[[], list[float]]:
+        """See `Slave.slopes`."""
+        references = [self._variable(name).valueReference for name in names]
+        return self.calls.bound(self._instance.output_slopes(references))
+
+    def lead(self, lines: Mapping[str, tuple[float, float]]) -> None:
+        """See `Slave.lead`."""
+        for name, (value, _) in lines.items():
+            self.set(name, value)
+        if self._give_slopes is None or self._led != [*lines]:
+            references = [self._variable(name).valueReference for name in lines]
+            self._led, self._give_slopes = [*lines], self.calls.bound(self._instance.input_slopes(references))
+        self._give_slopes([slope for _, slope in lines.values()])
+        self._lines = dict(lines)
+
+    def _carry_on(
+        self, t: float, t_next: float, told: Advance | None, lines: Mapping[str, tuple[float, float]] | None = None
+    ) -> Step:
         """Return what a step gave that the FMU has said something of, carried on where it stopped for nothing."""
+        start = t
         for _ in range(MAX_PARTS):
             if told is None:
                 return Step(t_next, False)
@@ -228,6 +254,8 @@ class FmuSlave(Slave):
                     f"{self.name} returns from a step at {t:.17g} s and gets no further: {self.calls.said}"
                 )
             t = reached
+            if lines:
+                self.lead({name: (value + slope * (t - start), slope) for name, (value, slope) in lines.items()})
             told = self._do_step(t, t_next - t if self.variable_step else self._size(t_next - t))
         raise CosimError(f"{self.name} returned early from one step {MAX_PARTS} times, the last time at {t:.17g} s.")
 
@@ -251,7 +279,7 @@ class FmuSlave(Slave):
         if self._access is not None:
             if not self.calls.fatal:
                 self._access.instance.free()
-            self._access, self._do_step, self._begun = None, self._first_step, False
+            self._access, self._do_step, self._begun, self._give_slopes = None, self._first_step, False, None
             self._file.yield_claim()
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -89,6 +89,10 @@ class Slave(Block):
     """Length in s of the steps that its solver makes, if they have one: between them its outputs stand still."""
     direct: Mapping[str, Collection[str]] = MappingProxyType({})
     """Output -> inputs that it depends on at once, as far as the block says; scalars that are no elements of arrays."""
+    sloped: Collection[str] = ()
+    """Outputs whose derivatives by time it gives, with `slopes`."""
+    interpolating: Collection[str] = ()
+    """Inputs that may change along straight lines within a step, with `lead`."""
     default_start_time: float | None = None
     default_stop_time: float | None = None
     default_step: float | None = None
@@ -147,6 +151,14 @@ class Slave(Block):
     @abstractmethod
     def get(self, name: str) -> Any:
         """Return the present value of a scalar variable: a `Value`."""
+
+    def slopes(self, names: Sequence[str]) -> Callable[[], list[float]]:
+        """Return what gives the present derivatives by time of outputs among `sloped`."""
+        raise NotImplementedError
+
+    def lead(self, lines: Mapping[str, tuple[float, float]]) -> None:
+        """Let inputs among `interpolating` have values at the start of the next step, and slopes in it."""
+        raise NotImplementedError
 
     def parse(self, name: str, text: str) -> Value:
         """Return the value of a variable that a text says, for `set`.

@@ -55,6 +55,24 @@ class FmuVariables:
         """Return the inputs or the outputs."""
         return [port for v in self._variables if v.causality == causality for port in self._ports(v)]
 
+    def flowing(self, causality: str) -> list[str]:
+        """Return the scalars among the inputs or the outputs that are numbers and change along flows."""
+        found = [v for v in self._variables if v.causality == causality and v.type in ("Real", "Float64")]
+        return [v.name for v in found if v.variability in (None, "continuous") and not v.dimensions]
+
+    def smooth_outputs(self, outputs: Iterable[Any]) -> list[str]:
+        """Return the flowing outputs that by the description depend on no flowing input at once.
+
+        FMUs know the derivatives of these alone, for inputs stand still in a step, as far as they know.
+        """
+        inputs = set(self.flowing("input"))
+        told = {unknown.variable.name: unknown.dependencies for unknown in outputs}
+        return [
+            name
+            for name in self.flowing("output")
+            if (depends := told.get(name)) is not None and not any(v.name in inputs for v in depends)
+        ]
+
     def direct(self, outputs: Iterable[Any]) -> dict[str, list[str]]:
         """Return the inputs that outputs depend on at once, of scalars and where the description says which.
 

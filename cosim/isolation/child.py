@@ -21,6 +21,8 @@ FACTS = (
         "internal_step",
         "variable_names",
         "stops_after_events",
+        "sloped",
+        "interpolating",
     ),
 )
 """What the other side knows of a slave."""
@@ -56,6 +58,12 @@ class Served:
         """Make a reader; return its handle."""
         handle = next(self._count)
         self._readers[handle] = self._slave.reader(names)
+        return handle
+
+    def slopes(self, names: list[str]) -> int:
+        """Make a reader of slopes; return its handle."""
+        handle = next(self._count)
+        self._readers[handle] = self._slave.slopes(names)
         return handle
 
     def read(self, handle: int) -> list[Any]:

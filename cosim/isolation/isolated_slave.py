@@ -7,7 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -92,6 +92,15 @@ class IsolatedSlave(Slave):
         """See `Slave.reader`."""
         handle = self._call("reader", list(names))
         return lambda: list(self._call("read", handle))
+
+    def slopes(self, names: Sequence[str]) -> Callable[[], list[float]]:
+        """See `Slave.slopes`."""
+        handle = self._call("slopes", list(names))
+        return lambda: list(self._call("read", handle))
+
+    def lead(self, lines: Mapping[str, tuple[float, float]]) -> None:
+        """See `Slave.lead`."""
+        self._call("lead", dict(lines))
 
     def parse(self, name: str, text: str) -> Value:
         """See `Slave.parse`."""

@@ -197,7 +197,7 @@ class _Run:
         states, history = macro.save(), macro.history.copy()
         try:
             before = macro.observe()
-            outcome, values = self._attempt(t, end)
+            outcome, values = self.macro.attempt(t, end)
             if h <= 2.0 * self._resolution:
                 outcome.due |= self._jumped(before)
                 self._row_before(states, t, end, outcome)
@@ -212,10 +212,10 @@ class _Run:
             if outcome.quiet or outcome.believed:
                 whole = macro.observe()
                 macro.restore(states)
-                outcome, values = self._attempt(t, middle)
+                outcome, values = self.macro.attempt(t, middle)
                 if outcome.quiet:
-                    macro.history.add(middle, values)
-                    outcome, values = self._attempt(middle, end)
+                    macro.history.add(middle, values, macro.slopes())
+                    outcome, values = self.macro.attempt(middle, end)
                     if (outcome.quiet or outcome.believed) and self._is_accurate(whole, end, values, h):
                         self._row_before(states, t, end, outcome)
                         self._arrive(end, values, outcome)
@@ -227,10 +227,6 @@ class _Run:
             self._shorten(t, h, outcome)
         finally:
             macro.release(states)
-
-    def _attempt(self, t: float, t_next: float) -> tuple[Outcome, list[float]]:
-        """Attempt a step with the signals as they are expected in its middle."""
-        return self.macro.attempt(t, t_next, self.macro.history.at(0.5 * (t + t_next)))
 
     def _is_accurate(self, whole: list[float], end: float, values: list[float], h: float) -> bool:
         """Return whether a step in two halves is accurate, and choose the length of the next one."""
@@ -279,7 +275,7 @@ class _Run:
             self.ended = outcome.ended
         elif not outcome.due and outcome.early is None:
             self._at_one_time = 0
-            self.macro.history.add(t, values)
+            self.macro.history.add(t, values, self.macro.slopes())
         else:
             self._happen(t, outcome.due or set(self._system.slaves))
             self._h, self._quiet = max(0.1 * self._h, 10.0 * self._resolution), _QUIET
@@ -304,7 +300,7 @@ class _Run:
     def _go_on(self, t: float) -> None:
         """Begin anew after the events at `t` in s."""
         if not self.ended:
-            self.macro.history.forget(t, self.macro.signals(t))
+            self.macro.history.forget(t, self.macro.signals(t), self.macro.slopes())
             self.macro.remember()
 
     def _shown(self, name: str) -> list[Any]:
@@ -328,7 +324,7 @@ class _Run:
             macro.restore(states)
             near = end - max(self._resolution, AHEAD * abs(end))
             if end - t > 2.0 * self._resolution and near > t:
-                self._attempt(t, near)
+                self.macro.attempt(t, near)
             self._row(end)
         finally:
             macro.restore(made)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -114,18 +115,30 @@ class MacroSteps:
         self.nominal_outputs = [_port(system, name).nominal for name in names]
         self.nominal_signals = [abs(c.factor) * _port(system, f"{c.source}.{c.output}").nominal for c in self._flows]
         self.nominal_signals += [_port(system, name).nominal for name in alone]
+        self._slope_places = _slope_places(system, [f"{c.source}.{c.output}" for c in self._flows] + alone)
+        self._no_slopes = [math.nan] * (len(self._flows) + len(alone))
+        self._leads = any(c.input in system.slaves[c.target].interpolating for c in self._flows)
         self._known: list[Any] = []
         self._at = dict.fromkeys(system.slaves, t)
         self.meet_at_events = not self._fed and all(
             slave.has_event_mode or slave.stops_after_events for slave in system.slaves.values()
         )
         self.steps = 0
-        self.history = SignalHistory(t, self.signals(t))
+        self.history = SignalHistory(t, self.signals(t), self._no_slopes)
         self.remember()
 
     def signals(self, t: float) -> list[float]:
         """Carry the continuous signals, and return them and the outputs of slaves that say nothing of their events."""
         return [*self.exchange(t), *self._alone()]
+
+    def slopes(self) -> list[float]:
+        """Return the derivatives of the signals by time, as far as slaves give them; else NaN."""
+        found = list(self._no_slopes)
+        for read_slopes, places in self._slope_places:
+            for places_of_one, slope in zip(places, read_slopes(), strict=True):
+                for k in places_of_one:
+                    found[k] = slope * (self._flows[k].factor if k < len(self._flows) else 1.0)
+        return found
 
     def exchange(self, t: float) -> list[float]:
         """Carry the continuous signals to their inputs at `t` in s, and return them.
@@ -171,14 +184,12 @@ class MacroSteps:
         for slave, _, state in states:
             slave.release(state)
 
-    def attempt(self, t: float, t_next: float, expected: FloatArray) -> tuple[Outcome, list[float]]:
-        """Step all slaves from `t` to `t_next`, in s.
+    def attempt(self, t: float, t_next: float) -> tuple[Outcome, list[float]]:
+        """Step all slaves from `t` to `t_next`, in s, with the signals as they are expected in it.
 
         Parameters
         ----------
         t, t_next : float
-        expected : ndarray
-            What the continuous connections are expected to carry in the middle.
 
         Returns
         -------
@@ -188,9 +199,10 @@ class MacroSteps:
         """
         outcome = Outcome()
         self._changes.follow(0.5 * (t + t_next))
+        middle = 0.5 * (t + t_next)
+        expected = self.history.about(middle) if self._leads else [self.history.at(middle)]
         for name, slave in self._system.slaves.items():
-            for k in self._into[name]:
-                slave.set(self._flows[k].input, float(expected[k]))
+            self._lead(name, expected, t_next - t)
             if self._at[name] >= t_next:  # by the length of a step that let it settle
                 continue
             made = slave.step(self._at[name], t_next)
@@ -220,6 +232,24 @@ class MacroSteps:
                 # What ends its steps after events has its event here, or it had ended before.
                 outcome.exact |= slave.stops_after_events and slave.name not in self._fed
         return outcome, values
+
+    def _lead(self, name: str, expected: list[FloatArray], h: float) -> None:
+        """Give a slave its continuous inputs for a step of length `h` in s, by what is expected about its middle.
+
+        They stand still at what they are expected to be in the middle, or go along the straight lines that come
+        nearest to it, in the mean of squares over the step, as Legendre's polynomials give them.
+        """
+        slave, lines = self._system.slaves[name], dict[str, tuple[float, float]]()
+        for k in self._into[name]:
+            into = self._flows[k].input
+            if into not in slave.interpolating:
+                slave.set(into, float(expected[0][k]))
+                continue
+            c = [float(coefficients[k]) for coefficients in expected] + [0.0] * (4 - len(expected))
+            mean, slope = c[0] + c[2] * h * h / 12.0, c[1] + 0.15 * c[3] * h * h
+            lines[into] = mean - 0.5 * slope * h, slope
+        if lines:
+            slave.lead(lines)
 
     def settle(self, name: str) -> Termination | None:
         """Let a slave that handles its events inside handle those that are due at once, in a step of no length.
@@ -273,6 +303,15 @@ def _differ(before: Sequence[Any], after: Sequence[Any]) -> bool:
         abs(b - a) > LEAP * max(abs(a), abs(b)) if isinstance(a, float) else a != b
         for a, b in zip(before, after, strict=True)
     )
+
+
+def _slope_places(system: System, names: Sequence[str]) -> list[tuple[Callable[[], list[float]], list[list[int]]]]:
+    """Return what gives slopes of signals, as slaves offer them, and where each is among the signals."""
+    found: dict[Slave, dict[str, list[int]]] = {}
+    for k, (slave, output) in enumerate(map(system.output, names)):
+        if output in slave.sloped:
+            found.setdefault(slave, {}).setdefault(output, []).append(k)
+    return [(slave.slopes(list(places)), list(places.values())) for slave, places in found.items()]
 
 
 def _is_flowing_number(system: System, name: str) -> bool:

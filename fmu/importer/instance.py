@@ -321,6 +321,34 @@ class FmuInstance:
         more = () if self.major == 2 else (size,)
         return list(self.fmu.getDirectionalDerivative(unknowns, [known], seed, *more))
 
+    def output_slopes(self, references: Sequence[int]) -> Callable[[], list[float]]:
+        """Return what gives the derivatives by time of outputs, for as long as the instance lives."""
+        name, count = spelled(self.major, "GetOutputDerivatives"), len(references)
+        values = (c.c_double * count)()
+        arguments = [(c.c_uint32 * count)(*references), c.c_size_t(count), (c.c_int32 * count)(*[1] * count), values]
+        call = self._bound(name, *arguments, *(() if self.major == 2 else (c.c_size_t(count),)))
+
+        def slopes() -> list[float]:
+            if (status := call()) > fmi1Warning:
+                raise FMICallException(function=name, status=status)
+            return values[:]
+
+        return slopes
+
+    def input_slopes(self, references: Sequence[int]) -> Callable[[Sequence[float]], None]:
+        """Return what gives inputs derivatives by time, for as long as the instance lives; of FMI 2.0 alone."""
+        name, count = "fmi2SetRealInputDerivatives", len(references)
+        values = (c.c_double * count)()
+        arguments = [(c.c_uint32 * count)(*references), c.c_size_t(count), (c.c_int32 * count)(*[1] * count), values]
+        call = self._bound(name, *arguments)
+
+        def give(slopes: Sequence[float]) -> None:
+            values[:] = list(slopes)
+            if (status := call()) > fmi1Warning:
+                raise FMICallException(function=name, status=status)
+
+        return give
+
     def save(self) -> Any:
         """Return the state."""
         return self.call("GetFMUState")

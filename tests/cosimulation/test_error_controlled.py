@@ -230,13 +230,17 @@ def test_a_slave_that_gets_no_further_ends_the_run_with_its_name():
         run_error_controlled(System(slaves, {"stuck.u": "x.x"}), 1.0)
 
 
-def test_a_parabola_goes_on_as_one():
-    history = SignalHistory(0.0, [0.0, 1.0])
+def test_polynomials_go_on_as_such():
+    """A parabola and a line by their values alone, and a cubic by its values and slopes."""
+    unknown = [np.nan, np.nan]
+    history = SignalHistory(0.0, [0.0, 1.0, 0.0], [*unknown, 0.0])
     for t in (0.5, 0.7):
-        history.add(t, [t**2, 1.0 - t])
-    np.testing.assert_allclose(history.at(1.3), [1.69, -0.3], atol=1e-15)
-    history.forget(1.0, [5.0, 5.0])
-    np.testing.assert_allclose(history.at(2.0), [5.0, 5.0])
+        history.add(t, [t**2, 1.0 - t, t**3], [*unknown, 3.0 * t**2])
+    np.testing.assert_allclose(history.at(1.3), [1.69, -0.3, 2.197], atol=1e-14)
+    expected = [[1.69, -0.3, 2.197], [2.6, -1.0, 5.07], [1.0, 0.0, 3.9], [0.0, 0.0, 1.0]]
+    np.testing.assert_allclose(history.about(1.3), expected, atol=1e-13)
+    history.forget(1.0, [5.0, 5.0, 5.0], [*unknown, 2.0])
+    np.testing.assert_allclose(history.at(2.0), [5.0, 5.0, 7.0])
 
 
 def test_each_steps_with_what_those_before_it_have_come_to():
