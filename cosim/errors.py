@@ -9,5 +9,9 @@ class MisfitError(CosimError, ValueError):
     """Signals do not fit together, or a master cannot treat them exactly."""
 
 
+class GivenValueError(MisfitError):
+    """A value that a run is given from outside does not fit the variable that it is for."""
+
+
 class UsageError(ValueError):
     """A command was given something that it does not know."""

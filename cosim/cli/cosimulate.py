@@ -109,6 +109,15 @@ def _slips_of(options: argparse.Namespace) -> Iterator[None]:
         raise
 
 
+@contextlib.contextmanager
+def _slips_in_tables() -> Iterator[None]:
+    """Let what a table says that was named, and does not fit, be wrong usage, as it is of systems and scenarios."""
+    try:
+        yield
+    except MisfitError as error:
+        raise UsageError(str(error)) from error
+
+
 def _save(
     options: argparse.Namespace, definition: SystemDefinition, system: System, experiment: Experiment, folder: Path
 ) -> int:
@@ -193,7 +202,8 @@ def _owner(slaves: dict[str, Slave], name: str) -> tuple[Slave, str]:
 def _run(system: System, options: argparse.Namespace, experiment: Experiment) -> int:
     if experiment.stop_time is None:
         raise UsageError(f"{options.system} proposes no stop time: give --stop-time.")
-    inputs = read_inputs(options.input_file, system) if options.input_file else {}
+    with _slips_in_tables():
+        inputs = read_inputs(options.input_file, system) if options.input_file else {}
     files = RunFiles(options, system, experiment.stop_time)
     try:
         result = _master(system, options, experiment, inputs, files)
@@ -206,7 +216,8 @@ def _run(system: System, options: argparse.Namespace, experiment: Experiment) ->
     finally:
         files.close()
     # Files first: whoever reads the text may close it before its end.
-    status, compared = files.finish(result)
+    with _slips_in_tables():
+        status, compared = files.finish(result)
     if options.json:
         print(json.dumps(_document(result, compared), indent=2))
     else:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.errors import CosimError, UsageError
+from cosim.errors import CosimError, GivenValueError, UsageError
 
 
 class Exit(enum.IntEnum):
@@ -29,10 +29,10 @@ def exit_of(stop: str) -> Exit:
 def status_of(error: Exception) -> Exit | None:
     """Return the exit status of an error, or None if it is a fault of this program.
 
-    Wrong usage is what was typed, and what a scenario says that was named there: names that there are not, values out
-    of range. Failed is what could be begun and did not work: a model, an FMU, a file, a run.
+    Wrong usage is what was typed, and what a scenario, a system or a table says that was named there: names that there
+    are not, values out of range. Failed is what could be begun and did not work: a model, an FMU, a file, a run.
     """
-    if isinstance(error, UsageError):
+    if isinstance(error, (UsageError, GivenValueError)):
         return Exit.USAGE
     # Not before there is an error: these take longer to import than the command line.
     from fmu.errors import BuildError, ExportError

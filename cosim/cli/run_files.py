@@ -69,9 +69,11 @@ class RunFiles:
             self._work.part((now - start) / (self._t_stop - start), told)
 
     def close(self) -> None:
-        """Write what is left of the rows; further files are for runs that came to an end."""
+        """Write what is left of the rows, and the events so far; further files are for runs that came to an end."""
         if self._rows is not None:
             self._rows.close()
+        if self._options.event_log and self.result is not None:
+            _write_events(self._options.event_log, self.result)
         self._work.__exit__(None, None, None)
 
     def finish(self, result: CosimResult) -> tuple[int, list[str]]:
@@ -79,8 +81,6 @@ class RunFiles:
         signals = self._named(result.signals)
         if self._options.output_file and self._rows is None:
             _write_table(self._options.output_file, result.times, signals)
-        if self._options.event_log:
-            _write_events(self._options.event_log, result)
         if self._options.plot or self._options.show_plot:
             draw(result.times, signals, self._title, self._options.plot, show=self._options.show_plot)
         if self._options.reference_file is None:

@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from cosim.errors import MisfitError
+from cosim.errors import GivenValueError, MisfitError
 from cosim.system import System
 from hybrid_model import Signal
 
@@ -105,7 +105,10 @@ class Changes:
         value = given.value(asked) if isinstance(given, Signal) else given
         if np.shape(value) != ():
             raise MisfitError(f"{name} is given {value!r} at t = {t:.9g} s: give one number, element by element.")
-        self._system.slaves[slave].set(variable, cast(float, value))
+        try:
+            self._system.slaves[slave].set(variable, cast(float, value))
+        except MisfitError as error:
+            raise GivenValueError(str(error)) from error
 
     def _since(self, signal: Signal, t: float) -> float:
         """Return the last breakpoint up to `t`, or the start."""

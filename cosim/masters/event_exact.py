@@ -186,7 +186,8 @@ def _refuse_curves(inputs: Mapping[str, Given]) -> None:
 def _require_discrete(system: System) -> None:
     for slave in system.slaves.values():
         if not slave.has_event_mode:
-            raise MisfitError(f"{slave.name} has no event mode: use the fixed-step master.")
+            other = "error-controlled" if slave.can_restore and slave.variable_step else "fixed-step"
+            raise MisfitError(f"{slave.name} has no event mode: use the {other} master.")
         if not slave.variable_step:
             raise MisfitError(
                 f"{slave.name} takes steps of one length only (canHandleVariableCommunicationStepSize is false), and "

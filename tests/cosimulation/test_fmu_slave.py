@@ -154,7 +154,7 @@ def test_slaves_of_both_versions_in_one_system(exported):
 
 def test_the_event_exact_master_refuses_fmi2_by_name(exported):
     system = System([FmuSlave("ball", exported(BouncingBall(), "ball", "2.0"))], {})
-    with pytest.raises(MisfitError, match="ball has no event mode: use the fixed-step master"):
+    with pytest.raises(MisfitError, match="ball has no event mode: use the error-controlled master"):
         run_event_exact(system, 1.0)
 
 

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from strangers import BACKWARD
 
 from cosim.cli.main import main
 from cosim.errors import CosimError, MisfitError
@@ -68,7 +69,7 @@ def test_inputs_of_all_types_arrive_exactly(echo, tmp_path):
 )
 def test_a_table_that_does_not_fit_is_refused(text, sentence, echo, tmp_path, capsys):
     table = written(tmp_path / "in.csv", text)
-    assert main(["cosim", str(echo), "--input-file", str(table)]) == 1
+    assert main(["cosim", str(echo), "--input-file", str(table)]) == 2
     assert sentence in capsys.readouterr().err
 
 
@@ -211,6 +212,22 @@ def test_events_are_logged_and_outputs_drawn(stranger, tmp_path):
     assert main(command) == 0
     assert columns(log) == {"time": ["0.5", "1.0", "1.5", "2.0"], "component": ["stranger"] * 4, "clocks": [""] * 4}
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_events_before_a_failure_are_logged(stranger, tmp_path, capsys):
+    """It refuses to go back in time after its first event, at 0.5 s."""
+    log = tmp_path / "events.csv"
+    values = ("rate=2", f"behaviour={BACKWARD}")
+    command = ["cosim", str(stranger()), "--event-log", str(log), *(f"--start-value={value}" for value in values)]
+    assert main(command) == 1
+    assert "outside the step" in capsys.readouterr().err
+    assert columns(log) == {"time": ["0.5"], "component": ["stranger"], "clocks": [""]}
+
+
+def test_a_table_of_reference_that_does_not_fit_is_wrong_usage(echo, tmp_path, capsys):
+    table = written(tmp_path / "ref.csv", "time,nobody\n0,1\n")
+    assert main(["cosim", str(echo), "--reference-file", str(table)]) == 2
+    assert "has none of the columns" in capsys.readouterr().err
 
 
 def test_a_trajectory_of_a_scenario_has_both_rows_of_a_jump(tmp_path):
