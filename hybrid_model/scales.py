@@ -28,6 +28,10 @@ ABSOLUTE = 1e-15
 """Absolute tolerance of a step, as a part of the usual size of a state."""
 ROUNDING_LEVEL = 3e-14
 """A state below this part of the largest one may be rounding: no digit of it is to be had."""
+SEEN_PART = 1e-10
+"""To see how the rates are rounded, what they depend on is moved by this part of itself, and time by it of a step."""
+LEFT_BY_ROUNDING = 64.0
+"""The error of a step may be so many roundings of the rates in its time."""
 UNKNOWN = 1e-6
 """States below this part of where their flow may lead have shown no size yet."""
 REACH_AT = (1e-3, 0.03, 0.3, 1.0)
@@ -96,6 +100,7 @@ _IN_MODELS = (
     *("overshoot", "jumps_at_once", "jumps_in_window", "accumulation", "spread", "crowd", "resolved", "chatter"),
     *("pause", "euler_part", "blind_part", "first_growth", "first_least", "reach_step", "reach_at"),
     *("sliding_after", "sliding_looks", "sliding_found", "sliding_left", "sliding_ahead", "retained"),
+    *("seen_part", "left_by_rounding"),
     *("halvings_least", "halvings_most", "away", "pace_steps", "most_compiled_steps"),
 )
 
@@ -179,6 +184,12 @@ def moves(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
     (ndarray, ndarray)
         Changes of the states, shape (n,) each.
     """
-    k = np.arange(len(sizes))
+    one_way, to_and_fro = part_moves(len(sizes))
+    return BORDER * sizes * one_way, BORDER * sizes * to_and_fro
+
+
+def part_moves(n: int) -> tuple[FloatArray, FloatArray]:
+    """Return the parts, at most one, by which `n` numbers are moved, all one way and to and fro."""
+    k = np.arange(n)
     weights = 1.0 - 0.5 * np.mod(k * 0.6180339887498949, 1.0)
-    return BORDER * sizes * weights, BORDER * sizes * weights * np.where(k % 2 == 0, 1.0, -1.0)
+    return weights, weights * np.where(k % 2 == 0, 1.0, -1.0)

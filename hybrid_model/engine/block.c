@@ -92,6 +92,20 @@ static void lay_out_quadrature(Engine *engine, Cursor *cursor)
     engine->quadrature.tails = take(cursor, vector);
 }
 
+static void lay_out_rounding(Engine *engine, Cursor *cursor)
+{
+    const Model *m = engine->model;
+    size_t vector = m->n_states * sizeof(double);
+    engine->rounding.rates = take(cursor, vector);
+    engine->rounding.turned = take(cursor, vector);
+    for (size_t k = 0; k < sizeof engine->rounding.seen / sizeof *engine->rounding.seen; k++)
+        engine->rounding.seen[k] = take(cursor, vector);
+    for (size_t k = 0; k < sizeof engine->rounding.differences / sizeof *engine->rounding.differences; k++)
+        engine->rounding.differences[k] = take(cursor, vector);
+    engine->rounding.moved =
+        take(cursor, (1 + m->n_states + m->n_discrete + m->n_inputs + m->n_parameters) * sizeof(double));
+}
+
 static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
 {
     const Model *m = engine->model;
@@ -109,6 +123,7 @@ static size_t lay_out_scratch(Engine *engine, unsigned char *memory)
     engine->step.vectors = take(&cursor, engine->method->n_vectors * vector);
     lay_out_implicit(engine, &cursor);
     lay_out_quadrature(engine, &cursor);
+    lay_out_rounding(engine, &cursor);
     engine->probe_x = take(&cursor, vector);
     engine->dense_x = take(&cursor, vector);
     engine->margins = take(&cursor, rows * sizeof(double));

@@ -14,6 +14,8 @@
    for such a step has an error of the order of the state, 1e13 tolerances. */
 #define SHORTEST 16.0
 #define LEFT_OPEN 1e6
+/* From one step to the next. */
+#define MOST_GROWTH 10.0
 
 static bool begin_with_rates(Engine *engine, const Point *point)
 {
@@ -63,11 +65,10 @@ static bool step_too_small(Engine *engine, const Point *point, double h, bool fi
 /* The proposal for the step after one of the length `used` where `h` was possible. */
 static double next_step(const Method *method, double h, double used, double error, bool rejected)
 {
-    const double most = 10.0;
     /* A step cut short by the limit says little about the next one, and no root need be taken. */
-    if (used * most <= h)
+    if (used * MOST_GROWTH <= h)
         return h;
-    double growth = error > 0.0 ? fmin(most, 0.9 * pow(error, -1.0 / method->order)) : most;
+    double growth = error > 0.0 ? fmin(MOST_GROWTH, 0.9 * pow(error, -1.0 / method->order)) : MOST_GROWTH;
     double proposal = used * (rejected ? fmin(1.0, growth) : fmax(0.2, growth));
     return used < h ? fmax(h, proposal) : proposal;
 }
@@ -85,12 +86,26 @@ static bool length_after_jump(Engine *engine, const Point *point, double limit, 
     return true;
 }
 
+/* Whether a step of the length `longest` is rejected for what rounding of its rates leaves open, which is allowed from
+   now on.  It is asked seldom: crossing a jump of the rates costs many rejections. */
+static bool rounding_found(Engine *engine, const Point *point, double longest, bool shortest, size_t rejections)
+{
+    bool is_time = shortest ? rejections == 0 : rejections == 1 || rejections == 4 || rejections == 16;
+    Rounding *rounding = &engine->rounding;
+    if (rounding->decides || !is_time || !engine_rounding_decides(engine, point, longest))
+        return false;
+    engine->statistics.rejected++;
+    return rounding->decides = true;
+}
+
 bool engine_step_accept(Engine *engine, const Point *point, double limit)
 {
     Step *step = &engine->step;
     const Method *method = engine->method;
     double t0 = *point->time, remaining = limit - t0, h = *point->step, shortest = SHORTEST * engine_time_ulp(t0);
-    bool rejected = false;
+    double longest = 0.0;
+    size_t rejections = 0;
+    engine->rounding.decides = false;
     step->is_known = method->known && method->known(engine, point, limit);
     if (step->is_known) {
         step->has_rates[1] = step->has_vectors = false;
@@ -116,15 +131,24 @@ bool engine_step_accept(Engine *engine, const Point *point, double limit)
         step->n_windows = 1;
         if (!method->trial(engine, point, &error))
             return false;
+        if (error > 1.0)
+            longest = fmax(longest, used > shortest ? used : MOST_GROWTH * used);
+        if (error > 1.0 && isfinite(error) &&
+            rounding_found(engine, point, longest, used <= shortest, rejections)) {
+            h = longest;
+            rejections = 0;
+            continue;
+        }
         if (error <= 1.0 || (used <= shortest && error <= LEFT_OPEN)) {
-            *point->step = error <= 1.0 ? next_step(method, h, used, error, rejected) : used;
+            *point->step = error <= 1.0 ? next_step(method, h, used, error, rejections > 0) : used;
             step->has_vectors = false;
+            engine->rounding.decides = false;
             engine->statistics.steps++;
             engine_watch_stiffness(engine, point);
             return engine_gets_on(engine, point, limit);
         }
         h = used * (isfinite(error) ? fmax(0.1, 0.9 * pow(error, -1.0 / method->order)) : 0.1);
-        rejected = true;
+        rejections++;
         engine->statistics.rejected++;
         if (h >= shortest && t0 + h > t0)
             continue;

@@ -55,6 +55,7 @@ typedef struct {
     double probe_parts[N_PROBE_PARTS], steady;
     double sliding_after, sliding_looks, sliding_found, sliding_left, sliding_ahead;
     double retained, halvings_least, halvings_most, away[N_AWAY], pace_steps, most_compiled_steps;
+    double seen_part, left_by_rounding;
 } ModelScales;
 
 typedef struct {

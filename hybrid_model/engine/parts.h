@@ -136,6 +136,14 @@ typedef struct {
     double *stages, *probe_stages;
 } Implicit;
 
+/* Of the present step, from its first rejections on: what rounding there is in each rate, how fast the flow takes back
+   what that moves (1/s), and whether no step is as exact as the states ask for; places to look at the rates. */
+typedef struct {
+    double *rates, *turned;
+    bool decides;
+    double *moved, *seen[5], *differences[3];
+} Rounding;
+
 typedef struct {
     double *values;
     size_t width, count, capacity;
@@ -166,6 +174,7 @@ struct Engine {
     Implicit implicit;            /* without places where no method for stiff flows may be needed */
     Quadrature quadrature;
     Factors factors;
+    Rounding rounding;
     double *probe_k[N_STAGES], *probe_x, *dense_x;
     double *margins, *enabled, *times, *samples, *sampled_x;
     double *times_of;             /* the discrete states and parameters that the times are those of */
@@ -243,6 +252,8 @@ bool engine_rates(Engine *engine, double t, const double *x, const double *z, do
 double engine_state_size(const Engine *engine, const Point *point, size_t i, double x);
 /* The largest state that the run has shown at the point, and at x. */
 double engine_largest_state(const Engine *engine, const Point *point, const double *x);
+/* What rounding of its rate leaves open in state i after a step of h. */
+double engine_left_by_rounding(const Engine *engine, size_t i, double h);
 /* The error that is allowed in state i of that size; engine->largest must be there. */
 double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size);
 /* The point has got where it is: its states are among those that the run has shown. */
@@ -255,6 +266,14 @@ void engine_clear_levels(const Engine *engine, const Point *point);
 void engine_leave_segment(Engine *engine);
 /* Something that the future depends on has changed. */
 void engine_changed(Engine *engine);
+
+/* rounding.c */
+/* Finds how much of the rates at (t, x, z), where steps are about `h` long, is rounding; false if that cannot be
+   told. */
+bool engine_find_rounding(Engine *engine, double t, const double *x, const double *z, double h);
+/* Whether in a step of h from the point rounding leaves more open than its error may be; engine_step_begin comes
+   before. */
+bool engine_rounding_decides(Engine *engine, const Point *point, double h);
 
 /* first_step.c */
 /* The length of a first step from the point towards `limit`, for states as large as `size`; engine_step_begin comes

@@ -131,6 +131,16 @@ static bool leads_back(Engine *engine, const Point *point, const JumpOfRates *ju
     return false;
 }
 
+/* Whether rounding alone makes such a jump: sums of large terms that cancel are as rough. */
+static bool is_rounding(Engine *engine, const Point *point, const JumpOfRates *jump, double time)
+{
+    const Side *near = &jump->near;
+    double least = engine_find_rounding(engine, near->t, near->x, point->z, time)
+                       ? engine->model->scales.left_by_rounding * engine->rounding.rates[jump->row]
+                       : 0.0;
+    return fabs(jump->after - jump->before) <= least;
+}
+
 /* Places for three points; what is probed on a step comes later. */
 static Side take_side(Engine *engine, size_t i, double t, const double *x)
 {
@@ -145,7 +155,8 @@ static bool find_jump(Engine *engine, const Point *point, double t, const double
     Side here = take_side(engine, 0, t, x);
     jump->far = take_side(engine, 1, t, x);
     *spare = take_side(engine, 2, t, x);
-    return engine->model->n_states > 0 && jump_ahead(engine, point, &here, time, jump, spare);
+    return engine->model->n_states > 0 && jump_ahead(engine, point, &here, time, jump, spare) &&
+           !is_rounding(engine, point, jump, time);
 }
 
 /* "the rate of 'v' jumps from -2 to 2 where its value is 0" */

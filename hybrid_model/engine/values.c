@@ -18,9 +18,15 @@ double engine_largest_state(const Engine *engine, const Point *point, const doub
     return largest;
 }
 
+double engine_left_by_rounding(const Engine *engine, size_t i, double h)
+{
+    const Rounding *of = &engine->rounding;
+    return engine->model->scales.left_by_rounding * of->rates[i] * h / (1.0 + h * of->turned[i]);
+}
+
 /* The absolute part follows from the nominal value, or from the sizes of the states: see usual_sizes in
    hybrid_model/scales.py. */
-double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size)
+static double wanted_scale(const Engine *engine, const Point *point, size_t i, double size)
 {
     const EngineOptions *options = &engine->options;
     const ModelScales *scales = &engine->model->scales;
@@ -32,6 +38,12 @@ double engine_error_scale(const Engine *engine, const Point *point, size_t i, do
     double usual = engine->largest * (shown < scales->rounding_level ? 1.0 : sqrt(shown));
     double part = scales->absolute * looser * (nominal > 0.0 ? nominal : fmin(usual, 1.0));
     return part + relative * size;
+}
+
+double engine_error_scale(const Engine *engine, const Point *point, size_t i, double size)
+{
+    double wanted = wanted_scale(engine, point, i, size), h = engine->step.t1 - engine->step.t0;
+    return engine->rounding.decides ? fmax(wanted, engine_left_by_rounding(engine, i, h)) : wanted;
 }
 
 void engine_note_sizes(const Engine *engine, const Point *point)

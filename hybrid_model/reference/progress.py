@@ -13,8 +13,10 @@ from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.errors import SimulationError
 from hybrid_model.reference.discontinuities import JumpOfRates, Side, jump_of_rates, leads_back
 from hybrid_model.reference.point import Point
+from hybrid_model.reference.rounding import rounding_of_rates
 from hybrid_model.reference.tolerances import quiet_rates
 from hybrid_model.scales import (
+    LEFT_BY_ROUNDING,
     MOST_STEPS,
     OVERSHOOT,
     PACE_STEPS,
@@ -92,7 +94,14 @@ class Progress:
         if not (t1 > t and np.isfinite(x1).all()):
             return None
         scale = absolute + self._point.solver.rtol * np.abs(x)
-        return jump_of_rates(self._rates, Side(t, x, rates), Side(t1, x1, self._rates(t1, x1)), scale)
+        jump = jump_of_rates(self._rates, Side(t, x, rates), Side(t1, x1, self._rates(t1, x1)), scale)
+        return None if jump is not None and self._is_rounding(jump, time) else jump
+
+    def _is_rounding(self, jump: JumpOfRates, time: float) -> bool:
+        """Whether rounding alone makes such a jump: sums of large terms that cancel are as rough."""
+        near, (before, after) = jump.before, jump.rates
+        rounding = rounding_of_rates(self._point, near.t, near.x, time)[jump.row]
+        return bool(abs(after - before) <= LEFT_BY_ROUNDING * rounding)
 
     @property
     def _rates(self) -> Callable[[float, FloatArray], FloatArray]:

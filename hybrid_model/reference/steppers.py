@@ -14,6 +14,7 @@ from hybrid_model.errors import HybridModelError, SimulationError
 from hybrid_model.record.flow_piece import FlowPiece, straight_piece
 from hybrid_model.reference.point import Point
 from hybrid_model.reference.progress import Progress
+from hybrid_model.reference.rounding import LOOK_AFTER, left_by_rounding
 from hybrid_model.reference.tolerances import reach, step_from
 from hybrid_model.reference.zero_crossings import SMALLEST
 from hybrid_model.scales import ABSOLUTE, UNKNOWN, tolerance_sizes, ulp
@@ -88,9 +89,9 @@ def steps(point: Point, end: float) -> Any:
     if point.t == point.t_start or point.sizes.max() == 0.0:
         _raise_floor(point, end)
     first = min(point.next_step or _first_step(point, end), options.max_step, end - point.t)
-    stepper, progress = _stepper(point, flow_map, end, first), Progress(point, end)
+    stepper, progress, rounds = _stepper(point, flow_map, end, first), Progress(point, end), False
     while stepper.status == "running":
-        t0, x0 = stepper.t, stepper.y
+        t0, x0, evaluations = stepper.t, stepper.y, stepper.nfev
         flow_map.forget()
         try:
             problem = stepper.step()
@@ -109,12 +110,21 @@ def steps(point: Point, end: float) -> Any:
             yield FlowPiece(t0, stepper.t, x0, stepper.y, stepper.dense_output())
             stepper.atol = _absolute_tolerance(point, 0.0)
             progress.check(stepper.t - t0, stepper.atol)
+            if rounds or stepper.nfev - evaluations > LOOK_AFTER:
+                rounds = _raise_tolerance(point, stepper)
         elif not flow_map.trouble and _raise_floor(point, end):
             stepper = _stepper(point, flow_map, end, min(_first_step(point, end), options.max_step))
         else:
             kind = StuckError if flow_map.trouble else SimulationError
             what = "" if flow_map.trouble else progress.what_jumps(_absolute_tolerance(point, 0.0))
             raise kind(_failure(point, flow_map, t0, x0, problem or "the step length fell to zero", what))
+
+
+def _raise_tolerance(point: Point, stepper: Any) -> bool:
+    """Allow steps the error that rounding of the rates makes; return whether they ask for less."""
+    wanted = stepper.atol
+    stepper.atol = np.maximum(wanted, left_by_rounding(point, getattr(stepper, "h_abs", stepper.step_size)))
+    return bool((stepper.atol > wanted + point.solver.rtol * np.abs(point.x)).any())
 
 
 def _stepper(point: Point, flow_map: FlowMap, end: float, first: float) -> Any:
