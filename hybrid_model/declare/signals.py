@@ -189,6 +189,11 @@ class Inputs:
         """The inputs that are functions of time: their places, functions, and breakpoints in s."""
         return self._signals
 
+    @property
+    def tuned(self) -> Sequence[Place]:
+        """The parameters that change in a run."""
+        return [place for place, _ in self._tuned]
+
     def breakpoints_in(self, t0: float, t1: float) -> list[float]:
         """Return the breakpoints of inputs and parameters in (t0, t1], in order, each once."""
         return sorted({b for b in self._breakpoints if t0 < b <= t1})

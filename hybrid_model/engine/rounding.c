@@ -1,11 +1,11 @@
 /* How much of the rates is rounding: where large terms cancel, no step is as exact as small states ask for (rule 12 of
    docs/semantics.md).  It decides as hybrid_model/reference/rounding.py does.
 
-   Rates are looked at along three short lines.  Their slope tells how large the terms are that a rate is a sum of, and so
-   how they are rounded, if it is the same in both halves, as it is not at a jump of the rates.  Points are so near to
-   each other that what is smooth has no second differences; what there is of them is rounding, which the slope does not
-   show of terms that depend on time alone: J. J. More, S. M. Wild, "Estimating computational noise", SIAM Journal on
-   Scientific Computing 33, 2011.  A jump looks alike, but is on one of the lines only. */
+   Rates are looked at along three short lines. Their slope tells how large the terms are that a rate is a sum of,
+   and so how they are rounded, if it is the same in both halves, as it is not at a jump of the rates. Points are so
+   near to each other that what is smooth has no second differences; what there is of them is rounding, which the
+   slope does not show of terms that depend on time alone: J. J. More, S. M. Wild, "Estimating computational noise",
+   SIAM Journal on Scientific Computing 33, 2011. A jump looks alike, but is on one of the lines only. */
 #include <float.h>
 #include <math.h>
 #include <string.h>

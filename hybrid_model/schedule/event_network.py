@@ -13,7 +13,7 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from hybrid_model.record.run_record import RunRecord
 from hybrid_model.reference.execution import Execution
 from hybrid_model.schedule.automaton_block import AutomatonBlock
 from hybrid_model.schedule.network_arrays import Network
+from hybrid_model.schedule.network_inputs import NetworkInputs
 from hybrid_model.schedule.network_run import NetworkRun
 from hybrid_model.schedule.progress import Told
 from hybrid_model.schedule.scheduler import Scheduler
@@ -49,7 +50,7 @@ def simulate_network(
     t_end: float,
     *,
     t_start: float = 0.0,
-    inputs: Mapping[str, InputValue] | None = None,
+    inputs: Mapping[str, Any] | None = None,
     solver: Solver | None = None,
     zeno: ZenoGuard | None = None,
     engine: str = "auto",
@@ -65,7 +66,8 @@ def simulate_network(
     t_end, t_start : float
         Times in s.
     inputs : mapping, optional
-        Input or tunable parameter of the composition -> as in `simulate`.
+        Input or tunable parameter of the composition -> as in `simulate`; of the parts of a `Network` -> a function of
+        time for all parts, or a sequence with one for each, None where a part keeps its value.
         A function that jumps or has short pulses needs a `Signal` with its breakpoints: a plain one is looked at where
         the solver steps, and a pulse between two steps goes unseen.
     solver : Solver, optional
@@ -113,37 +115,37 @@ def simulate_network(
         )
     solver, zeno = solver or Solver(), zeno or ZenoGuard()
     span, why = (t_start, t_end), 'python: it was asked for (engine="python").'
-    parts = _given(network, span, inputs or {}, solver, zeno)
+    arrays = NetworkInputs(network, inputs or {}) if isinstance(network, Network) else None
+    parts = {} if isinstance(network, Network) else _parts(network, span, inputs or {}, solver, zeno)
     if engine != "python":
         try:
             # CasADi is imported by whoever runs something, and not by all who import the package.
             from hybrid_model.schedule.native_network import native_network_run
 
-            return native_network_run(network, parts, span, solver, zeno, events_to=events_to, progress=progress)
+            return native_network_run(
+                network, parts, arrays, span, solver, zeno, events_to=events_to, progress=progress
+            )
         except (TraceError, BuildError) as error:
             why = f"python: {error}"
             if engine == "native":
                 raise SimulationError(f"{network.name} cannot run on the native engine: {error}") from error
-    if isinstance(network, Network):
-        network = network.composition()
-        parts = _given(network, span, inputs or {}, solver, zeno)
-    return _python_run(network, parts, span, solver, why)
+    if not isinstance(network, Network):
+        return _python_run(network, parts, span, solver, why)
+    whole = network.composition()
+    parts = _parts(whole, span, arrays.scoped() if arrays else {}, solver, zeno)
+    return _python_run(whole, parts, span, solver, why)
 
 
-def _given(
-    network: Composition | Network,
+def _parts(
+    network: Composition,
     span: tuple[float, float],
     inputs: Mapping[str, InputValue],
     solver: Solver,
     zeno: ZenoGuard,
 ) -> dict[str, Execution]:
     """Return the parts of a composition at their start; those of arrays begin in the engine."""
-    if isinstance(network, Composition):
-        _require_discrete(network)
-        return _executions(network, *span, inputs, solver, zeno)
-    if inputs:
-        raise WiringError(f"{network.name}: the inputs of a Network are among its values.")
-    return {}
+    _require_discrete(network)
+    return _executions(network, *span, inputs, solver, zeno)
 
 
 def _python_run(

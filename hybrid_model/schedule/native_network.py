@@ -21,6 +21,7 @@ from hybrid_model.schedule.blocks import StiffPart
 from hybrid_model.schedule.event_store import EventStore
 from hybrid_model.schedule.network_arrays import Network
 from hybrid_model.schedule.network_events import NetworkEvents
+from hybrid_model.schedule.network_inputs import NetworkInputs
 from hybrid_model.schedule.network_run import NetworkRun
 from hybrid_model.schedule.outside import Given, Outside
 from hybrid_model.schedule.part_table import PartTable, table_of, table_of_arrays
@@ -55,6 +56,7 @@ class NetworkOutcome:
 def native_network_run(
     network: Composition | Network,
     runs: Mapping[str, Execution],
+    inputs: NetworkInputs | None,
     span: tuple[float, float],
     solver: Solver,
     zeno: ZenoGuard,
@@ -70,6 +72,8 @@ def native_network_run(
         See `hybrid_model.schedule.event_network.simulate_network`.
     runs : mapping
         The parts of a composition at their start.
+    inputs : NetworkInputs or None
+        What those of a network as arrays are given.
 
     Raises
     ------
@@ -79,18 +83,22 @@ def native_network_run(
         If there is no compiler, or it fails.
     """
     require_supported(solver)
-    given = {k: one for k, run in enumerate(runs.values()) if (one := Given.of(run.inputs, span)) is not None}
+    if inputs is None:
+        given = {k: one for k, run in enumerate(runs.values()) if (one := Given.of(run.inputs, span)) is not None}
+    else:
+        given = inputs.given(span)
     stiff = solver.method in FOR_STIFF_FLOWS
     try:
-        return _run_once(network, runs, given, span, solver, zeno, events_to, progress, stiff=stiff)
+        return _run_once(network, runs, inputs, given, span, solver, zeno, events_to, progress, stiff=stiff)
     except StiffPart:
         # From the start, with the derivatives that another method needs: so the first run is as all later ones.
-        return _run_once(network, runs, given, span, solver, zeno, events_to, progress, stiff=True)
+        return _run_once(network, runs, inputs, given, span, solver, zeno, events_to, progress, stiff=True)
 
 
 def _run_once(
     network: Composition | Network,
     runs: Mapping[str, Execution],
+    inputs: NetworkInputs | None,
     given: Mapping[int, Given],
     span: tuple[float, float],
     solver: Solver,
@@ -101,7 +109,7 @@ def _run_once(
     stiff: bool,
 ) -> NetworkRun:
     if isinstance(network, Network):
-        table = table_of_arrays(network, *span, stiff=stiff)
+        table = table_of_arrays(network, given, *span, stiff=stiff)
     else:
         table = table_of(network, runs, given, stiff=stiff)
     store = EventStore(table.about, table.width, None if events_to is None else Path(events_to))
@@ -126,7 +134,7 @@ def _run_once(
     def declared(part: int) -> tuple[Automaton, Inputs]:
         if isinstance(network, Network):
             automaton = network.copy(part)
-            return automaton, Inputs(layout_of(automaton))
+            return automaton, Inputs(layout_of(automaton), inputs.of_part(part) if inputs else None)
         return starts[part].automaton, starts[part].inputs
 
     events = EventTable(columns, len(table.names), outside)

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from hybrid_model.declare.automaton import Automaton, require_automaton
 from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.layout import Place, layout_of
+from hybrid_model.declare.real_numbers import real_array, told
 from hybrid_model.declare.variables import FloatArray, Kind, Variable, unknown_name
 from hybrid_model.errors import DeclarationError, WiringError
 from hybrid_model.schedule.copies import Copy
@@ -110,6 +111,10 @@ class Network:
         self.templates, self.group_of = _groups(part, self.links)
         for template in self.templates:
             require_automaton(template)
+        for key in (values or {}).keys() & (link_values or {}).keys():
+            raise DeclarationError(
+                f"{name}: {key} is given among the values and among the link_values: leave one of them out."
+            )
         self._values = {key: self._per_part(key, value) for key, value in (values or {}).items()}
         self._link_values = {key: self._per_link(key, value) for key, value in (link_values or {}).items()}
         self._check_signals()
@@ -257,7 +262,12 @@ def _variable(template: Automaton, name: str, *kinds: Kind) -> Variable:
 
 
 def _finite(owner: str, name: str, given: npt.ArrayLike) -> FloatArray:
-    value = np.asarray(given, dtype=np.float64)
+    try:
+        value = real_array(given)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise DeclarationError(
+            f"{owner}: {name} = {told(given)} is no array of real numbers: give numbers, as many in each row."
+        ) from error
     if not np.all(np.isfinite(value)):
         raise DeclarationError(f"{owner}: {name} has values that are not finite.")
     return value

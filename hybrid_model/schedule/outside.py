@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -49,6 +50,18 @@ class Given:
             return None
         return cls(inputs, drive(inputs, span) if inputs.vary else None, [*breakpoints, span[1]])
 
+    @functools.cached_property
+    def tuned(self) -> list[int]:
+        """The places of parameters that change."""
+        return [k for place in self.inputs.tuned for k in range(place.at.start, place.at.stop)]
+
+    def begin(self, u: FloatArray, p: FloatArray, t: float) -> tuple[FloatArray, FloatArray]:
+        """Return the inputs and the parameters of a part at the start `t` in s, which has these by itself."""
+        inputs, parameters = self.piece(t, 0)
+        first, tuned = len(self.inputs.held), p.copy()
+        tuned[self.tuned] = parameters[self.tuned]
+        return np.concatenate([u[:first], inputs[first:]]), tuned
+
     def piece(self, a: float, k: int) -> tuple[FloatArray, FloatArray]:
         """Return the inputs and the parameters from `a` in s to the end number `k`."""
         return given_on(self.inputs, self.driven, a, self.ends[k], closed=k == len(self.ends) - 1)
@@ -87,8 +100,9 @@ class Outside:
         u, p = given.piece(given.ends[k], k + 1)
         network.look_until(part, given.ends[k + 1])
         # The inputs of the automaton that vary are computed from those behind them; the others are received.
-        for kind, values, first in ((Kind.INPUT, u, len(given.inputs.held)), (Kind.PARAMETER, p, 0)):
-            for index in range(first, len(values)):
+        driving = range(len(given.inputs.held), len(u))
+        for kind, values, places in ((Kind.INPUT, u, driving), (Kind.PARAMETER, p, given.tuned)):
+            for index in places:
                 self._happened[part].append((given.ends[k], float(values[index]), index, _OF[kind]))
                 self._after[part].append(events)
                 if not network.receive(part, kind, index, float(values[index])):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition, ElementWire
@@ -163,13 +164,17 @@ def table_of(
     return PartTable(network.name, parts, automata, groups, group_of, row_of, wires, computed=False)
 
 
-def table_of_arrays(network: Network, start: float, stop: float, *, stiff: bool) -> PartTable:
+def table_of_arrays(
+    network: Network, given: Mapping[int, Given], start: float, stop: float, *, stiff: bool
+) -> PartTable:
     """Put a network that is given as arrays into groups; its start values are computed when it starts.
 
     Parameters
     ----------
     network : Network
         Copies of few parts.
+    given : mapping
+        Number of a part -> what it is given from outside, where that changes.
     start, stop : float
         Of the run, in s.
     stiff : bool
@@ -183,15 +188,20 @@ def table_of_arrays(network: Network, start: float, stop: float, *, stiff: bool)
         If there is no compiler, or it fails.
     """
     sent = list(dict.fromkeys(network.signals.values()))
-    groups = []
-    for k, template in enumerate(network.templates):
+    groups: list[PartGroup] = []
+    automata: list[Automaton] = []
+    group_of, row_of = (np.zeros(network.links.count, np.uint32) for _ in range(2))
+    for k, (template, parts) in enumerate(zip(network.templates, network.members, strict=True)):
         places = _places(template)
+        signals = tuple(places[name] for name in sent)
+        rows = tuple(network.rows(k, kind) for kind in ROWS)
         run = Execution(template, t_start=start, t_stop=stop)
-        x, z, u, p = (network.rows(k, kind) for kind in ROWS)
-        groups.append(PartGroup(_model(run, stiff=stiff), tuple(places[name] for name in sent), (x, z, u, p)))
-    row_of = np.zeros(network.links.count, np.uint32)
-    for members in network.members:
-        row_of[members] = np.arange(len(members), dtype=np.uint32)
+        for model, chosen in _by_model(run, [given.get(part) for part in parts], stiff=stiff):
+            group_of[parts[chosen]] = len(groups)
+            row_of[parts[chosen]] = np.arange(len(chosen), dtype=np.uint32)
+            own = [given.get(part) for part in parts[chosen]]
+            groups.append(PartGroup(model, signals, _given_rows(rows, chosen, own, start)))
+            automata.append(template)
     links = network.links
     number = (np.arange(len(links.receivers)) - links.first[links.receivers]).astype(np.uint32)
     columns = []
@@ -203,10 +213,37 @@ def table_of_arrays(network: Network, start: float, stop: float, *, stiff: bool)
     wires = [np.concatenate([np.zeros(0, np.uint32), *column]) for column in zip(*columns, strict=True)]
     empty = [np.zeros(0, np.uint32)] * 4
     compressed = wires_by_source(links.count, *(wires or empty))
-    of = network.group_of
     return PartTable(
-        network.name, network.parts, network.templates, tuple(groups), of, row_of, compressed, computed=True
+        network.name, network.parts, tuple(automata), tuple(groups), group_of, row_of, compressed, computed=True
     )
+
+
+def _by_model(
+    run: Execution, given: Sequence[Given | None], *, stiff: bool
+) -> list[tuple[NativeModel, npt.NDArray[np.intp]]]:
+    """Return the models that parts with one declaration need for what they are given, and which parts need each."""
+    number: dict[int, int] = {}
+    models: list[NativeModel] = []
+    known: dict[int, int] = {}
+    of = np.zeros(len(given), np.intp)
+    for k, one in enumerate(given):
+        if id(one) not in known:
+            model = _model(run, one, stiff=stiff)
+            known[id(one)] = number.setdefault(model.pointer, len(models))
+            models += [model] * (known[id(one)] == len(models))
+        of[k] = known[id(one)]
+    return [(model, np.flatnonzero(of == k)) for k, model in enumerate(models)]
+
+
+def _given_rows(
+    rows: tuple[FloatArray, ...], chosen: npt.NDArray[np.intp], given: Sequence[Given | None], start: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the rows of some parts, with what they are given at the start, in s."""
+    x, z, u, p = (kind[chosen] for kind in rows)
+    if all(one is None for one in given):
+        return x, z, u, p
+    begun = [(own, of) if one is None else one.begin(own, of, start) for one, own, of in zip(given, u, p, strict=True)]
+    return x, z, np.array([inputs for inputs, _ in begun]), np.array([of for _, of in begun])
 
 
 def _input(template: Automaton, name: str) -> int:

@@ -142,3 +142,51 @@ def test_many_parts_with_tables_of_their_own_share_their_maps():
     together = hm.simulate(network, 6.0, inputs=inputs)
     theirs = np.array([together.at(f"{part}.temperature", 6.0) for part in network.parts])
     assert np.abs(apart.final("temperature") - theirs).max() < 1e-9
+
+
+def corridor(count, **values):
+    links = (np.arange(1, count), np.arange(count - 1))
+    starts = 18.0 + 0.3 * np.arange(count)
+    return hm.Network(
+        "corridor", Room(), links, {"beside": "on"}, values={"temperature": starts, **values}, label="room", count=count
+    )
+
+
+SUN = hm.Signal(lambda t: float(np.interp(t, TIMES, VALUES)), TIMES)
+OF_ARRAYS = {
+    "shared function": {"outside": WEATHER["room0.outside"]},
+    "shared table, some targets": {"outside": SUN, "target": [None, WEATHER["room2.target"], None, None]},
+    "each its own": {"outside": [SUN, None, WEATHER["room0.outside"], hm.Signal(lambda t: 5.0 + (t > 3.0), [3.0])]},
+}
+
+
+@pytest.mark.parametrize("name", OF_ARRAYS)
+@ENGINES
+def test_parts_of_arrays_are_given_one_function_or_one_each(name, engine):
+    network = corridor(4, outside=np.arange(4.0), target=[20.0, 20.5, 21.0, 19.5])
+    apart = hm.simulate_network(network, 6.0, inputs=OF_ARRAYS[name], engine=engine)
+    each = {key: value if isinstance(value, list) else [value] * 4 for key, value in OF_ARRAYS[name].items()}
+    given = {f"room{k + 1}.{key}": one for key, ones in each.items() for k, one in enumerate(ones) if one is not None}
+    together = hm.simulate(network.composition(), 6.0, inputs=given)
+    assert apart.engine.startswith(engine)
+    assert len(apart.events) > 10
+    grid = np.linspace(0.013, 5.987, 30)
+    for variable in ("temperature", "outside", "target", "on"):
+        theirs = np.array([together.at(f"{part}.{variable}", grid) for part in network.parts])
+        assert np.abs(apart.at(variable, grid) - theirs).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ({"weather": SUN}, "each part of corridor has no input 'weather'"),
+        ({"beside": SUN}, "corridor: beside is what parts hear of others: leave it out of the inputs"),
+        ({"outside": [SUN] * 3}, "corridor: outside = .*one function of time or Signal for all parts, or a list of 4"),
+        ({"outside": 5.0}, "corridor: outside = 5.0 among the inputs: .*numbers are given among the values"),
+        ({"outside": "warm"}, "corridor: outside = 'warm' among the inputs"),
+        ({"outside": [5.0] * 4}, "numbers are given among the values"),
+    ],
+)
+def test_what_arrays_cannot_be_given_is_told(inputs, message):
+    with pytest.raises(hm.WiringError, match=message):
+        hm.simulate_network(corridor(4), 1.0, inputs=inputs)
