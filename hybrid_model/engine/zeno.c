@@ -123,15 +123,15 @@ bool engine_too_many_at_once(Engine *engine, size_t jump, unsigned long long cou
     char others[NAME_SIZE];
     if (engine->status->recent_time == t && in_turn_with(engine, jump, others, sizeof others) > 0)
         return engine_fail(engine, ENDED_ZENO,
-                           "Zeno: %llu jumps of '%s' at one instant, t = %.10g s, in turn with %s: they enable each "
-                           "other. Remedy: make the jump map of one of them leave the jump sets of the others (a "
+                           "Zeno: %llu jumps of '%s' at one instant, t = %.9g s, in turn with %s: they enable each "
+                           "other. Make the jump map of one of them leave the jump sets of the others (a "
                            "margin of zero is inside), or move its time on past the present.",
                            count, name, t, others);
     if (entry->kind == JUMP_ON_TIME)
         return engine_fail(
             engine, ENDED_ZENO,
-            "Zeno: %llu jumps of '%s' at one instant, t = %.10g s: its time is still not after the present. "
-            "Remedy: let the jump map move the time on past it; where a run starts later than its clock, "
+            "Zeno: %llu jumps of '%s' at one instant, t = %.9g s: its time is still not after the present. "
+            "Let the jump map move the time on past it; where a run starts later than its clock, "
             "declare the clock's state with computed=True and let start_map give the next time to come.",
             count, name, t);
     return engine_fail(engine, ENDED_ZENO,

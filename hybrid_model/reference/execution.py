@@ -130,14 +130,14 @@ class Execution(Point):
             If the flow map gives values that are not finite, or the solver cannot go on.
         """
         if not self.in_flow_set():
-            self._block("the state is in neither the flow set nor the jump set")
+            self._block()
             return []
         self.clear_levels()
         pieces, left = flow_to_first_event(self, limit, self.next_time_event())
         self.tune()
         self._left_flow_set = left
         if left and self.due() is None and not self._outside_by_rounding():
-            self._block("the flow left the flow set, and the state is not in the jump set")
+            self._block()
         return pieces
 
     @_QUIET
@@ -185,12 +185,13 @@ class Execution(Point):
         flow_first = self.automaton.priority is Priority.FLOW
         return flow_first and self.flow_margin() > -border(self, self.t, self.x)
 
-    def _block(self, what: str) -> None:
+    def _block(self) -> None:
         state = self.layout.describe({Kind.STATE: self.x, Kind.DISCRETE: self.z})
         self.stop(
             Stop.BLOCKED,
-            f"{what} at t = {self.t:.9g} s: {state}; margin of the flow set {self.flow_margin():.3g}. Enlarge one of "
-            "the sets, or make the jump map land in their union.",
+            f"Blocked: the state is in neither the flow set nor the jump set at t = {self.t:.9g} s: {state}; margin of "
+            f"the flow set {self.flow_margin():.3g}. Enlarge one of the sets, or make the jump map land in their "
+            "union.",
         )
 
     def _require_progress(self, index: int, times: FloatArray) -> None:

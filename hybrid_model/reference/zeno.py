@@ -106,7 +106,7 @@ class ZenoMonitor:
         if history.at_once > self.guard.jumps_at_once:
             others = self._in_turn_with(jump)
             remedy = _IN_TURN if others else _STILL_ENABLED if on_state else _STILL_DUE
-            return f"{history.at_once} jumps of {jump!r} at one instant, t = {t:.9g} s{others}: {remedy}"
+            return f"Zeno: {history.at_once} jumps of {jump!r} at one instant, t = {t:.9g} s{others}: {remedy}"
         if not on_state:
             return None
         return self._geometric(jump, history, t) or self._crowded(jump, history, t)
@@ -127,8 +127,8 @@ class ZenoMonitor:
         if left > max(remainder, scales.RESOLVED * ulp(t)):
             return None
         return (
-            f"{history.total} jumps of {jump!r} accumulate at t = {t + left:.12g} s (the last gap was {gap:.2g} s, "
-            f"each {ratio:.3f} times the one before). End the run before that time, or give the jump set a minimum "
+            f"Zeno: {history.total} jumps of {jump!r} accumulate at t = {t + left:.12g} s (the last gap was {gap:.2g} "
+            f"s, each {ratio:.3f} times the one before). End the run before that time, or give the jump set a minimum "
             "dwell time."
         )
 
@@ -139,8 +139,8 @@ class ZenoMonitor:
         if history.burst < n or span > window:
             return None
         return (
-            f"{n} jumps of {jump!r} in {span:.2g} s around t = {t:.12g} s: jumps accumulate there. End the run before, "
-            "or give the jump set a minimum dwell time."
+            f"Zeno: {n} jumps of {jump!r} in {span:.2g} s around t = {t:.12g} s: jumps accumulate there. End the run "
+            "before, or give the jump set a minimum dwell time."
         )
 
 

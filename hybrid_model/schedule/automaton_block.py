@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from hybrid_model.declare.variables import Kind
@@ -31,6 +32,8 @@ class AutomatonBlock(Block):
         Whether the caller handles events; if not, they are handled inside each step.
     keep : bool
         Whether to record flows and jumps.
+    on_jump : callable, optional
+        Called with the name after each jump that is no breakpoint.
 
     Attributes
     ----------
@@ -49,11 +52,13 @@ class AutomatonBlock(Block):
         predictable: bool = True,
         events: bool = True,
         keep: bool = True,
+        on_jump: Callable[[str], None] | None = None,
     ) -> None:
         self.name = name
         self.run = run
         self.recording = Recording(run.t, run.j, run.x, run.z, run.inputs.held, keep=keep)
         self._t_stop, self._predictable, self._events = t_stop, predictable, events
+        self._on_jump = on_jump
         self._ahead: PredictedRun | None = None
         self._places = {element: (kind, k) for kind in Kind for k, element in enumerate(run.layout.names(kind))}
 
@@ -105,6 +110,8 @@ class AutomatonBlock(Block):
         if index is not None:
             self.recording.jumped(run.jump(index))
             self._ahead = None
+            if self._on_jump:
+                self._on_jump(self.name)
             ticks = tuple(clock.name for clock in run.automaton.clocks if clock.jump == index)
             self._take_internal()
         if run.stopped is not None:

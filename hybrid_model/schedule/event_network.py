@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -152,7 +152,8 @@ def _python_run(
     network: Composition, runs: Mapping[str, Execution], span: tuple[float, float], solver: Solver, why: str
 ) -> NetworkRun:
     t_start, t_end = span
-    blocks = {part: AutomatonBlock(part, run, t_end) for part, run in runs.items()}
+    order: list[str] = []
+    blocks = {part: AutomatonBlock(part, run, t_end, on_jump=order.append) for part, run in runs.items()}
     wires: dict[str, list[ElementWire]] = {part: [] for part in network.parts}
     for wire in network.wires:
         wires[wire.source].append(wire)
@@ -162,7 +163,7 @@ def _python_run(
     scheduler.handle_events(t_start, blocks)
     if not scheduler.ended:
         scheduler.advance_to(t_end)
-    return _result(network, blocks, scheduler, t_end, why)
+    return _result(network, blocks, scheduler, order, t_end, why)
 
 
 def _require_discrete(network: Composition) -> None:
@@ -222,7 +223,12 @@ def _start(run: Execution, values: Values, given: Mapping[str, InputValue]) -> N
 
 
 def _result(
-    network: Composition, blocks: Mapping[str, AutomatonBlock], scheduler: Scheduler, t_end: float, why: str
+    network: Composition,
+    blocks: Mapping[str, AutomatonBlock],
+    scheduler: Scheduler,
+    order: Sequence[str],
+    t_end: float,
+    why: str,
 ) -> NetworkRun:
     stop, message, t = Stop.HORIZON, f"{network.name}: reached t = {t_end:.9g} s.", t_end
     if scheduler.ended:
@@ -234,10 +240,10 @@ def _result(
         read = ReceivedValues(run.automaton, run.inputs, recording.received)
         flows = [replace(flow, z=np.append(flow.z, j)) for j, flow in enumerate(recording.flows)]
         arcs[part] = HybridArc(RunRecord(read, flows, recording.jumps, stop, message, run.event_tolerance))
-    return NetworkRun(arcs, stop, message, t, why, lambda: _events(network, arcs))
+    return NetworkRun(arcs, stop, message, t, why, lambda: _events(network, arcs, order))
 
 
-def _events(network: Composition, arcs: Mapping[str, HybridArc]) -> NetworkEvents:
+def _events(network: Composition, arcs: Mapping[str, HybridArc], order: Sequence[str]) -> NetworkEvents:
     from hybrid_model.schedule.events_of_arcs import events_of_arcs
 
-    return events_of_arcs(network, arcs)
+    return events_of_arcs(network, arcs, order)

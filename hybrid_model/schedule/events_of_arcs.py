@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from hybrid_model.record.arc import HybridArc
 from hybrid_model.schedule.network_events import NetworkEvents
 
 
-def events_of_arcs(network: Composition, arcs: Mapping[str, HybridArc]) -> NetworkEvents:
-    """Return all jumps but breakpoints; those of one time are in the order of the parts, not of what caused them.
+def events_of_arcs(network: Composition, arcs: Mapping[str, HybridArc], order: Sequence[str]) -> NetworkEvents:
+    """Return all jumps but breakpoints, in the order in which they were taken.
 
     Parameters
     ----------
@@ -20,6 +20,8 @@ def events_of_arcs(network: Composition, arcs: Mapping[str, HybridArc]) -> Netwo
         What ran.
     arcs : mapping
         Part -> its arc.
+    order : sequence of str
+        The part that took each of them.
     """
     parts = list(network.parts.items())
     sent: list[list[str]] = [[] for _ in parts]
@@ -29,13 +31,17 @@ def events_of_arcs(network: Composition, arcs: Mapping[str, HybridArc]) -> Netwo
         if wire.output not in names:
             names.append(wire.output)
     width = max(map(len, sent), default=0)
-    rows = [
-        (jump.t, k, jump.index, [_element(arcs[name], jump.t, jump.j + 1, output) for output in sent[k]])
+    of_part = {
+        name: iter(
+            [
+                (jump.t, k, jump.index, [_element(arcs[name], jump.t, jump.j + 1, output) for output in sent[k]])
+                for jump in arcs[name].jumps
+                if not automaton.jumps[jump.index].internal
+            ]
+        )
         for k, (name, automaton) in enumerate(parts)
-        for jump in arcs[name].jumps
-        if not automaton.jumps[jump.index].internal
-    ]
-    rows.sort(key=lambda row: row[:2])
+    }
+    rows = [next(of_part[name]) for name in order]
     values = np.array([row[3] + [np.nan] * (width - len(row[3])) for row in rows]).reshape(len(rows), width)
     return NetworkEvents(
         np.array([row[0] for row in rows]),

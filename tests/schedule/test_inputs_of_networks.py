@@ -114,10 +114,11 @@ def test_a_change_comes_before_the_jumps_of_its_instant(engine, end):
         assert own == [jump.name[2:] for jump in together.jumps if jump.name.startswith(part)]
 
 
-def test_order_of_events_within_the_instant_of_a_change():
+@ENGINES
+def test_order_of_events_within_the_instant_of_a_change(engine):
     inputs = {"b.u": hm.Signal(lambda t: 0.0 if t < 2.0 else 1.0, [2.0])}
     network = hm.Composition("bells", {name: Bell() for name in "ab"}, {"a.heard": "b.sent"})
-    events = hm.simulate_network(network, 3.0, inputs=inputs, engine="native").events
+    events = hm.simulate_network(network, 3.0, inputs=inputs, engine=engine).events
     together = hm.simulate(network, 3.0, inputs=inputs)
     names = [f"{'ab'[part]}.{events.jumps[0][jump]}" for part, jump in zip(events.part, events.jump, strict=True)]
     assert names == [jump.name for jump in together.jumps]
