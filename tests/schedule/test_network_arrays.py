@@ -228,4 +228,4 @@ def test_memory_does_not_grow_with_the_events_that_are_kept_elsewhere():
 
     ring = nx.cycle_graph(1000)
     network = hm.Network("ring", lambda degree: Sender(degree=degree), ring, {"heard": "sent"})
-    assert table_of_arrays(network, 0.0, 1.0, stiff=False).network().memory < 1000 * 2500
+    assert table_of_arrays(network, {}, 0.0, 1.0, stiff=False).network().memory < 1000 * 2500
