@@ -4,8 +4,8 @@ Rates are looked at along three short lines. Their slope tells how large the ter
 how they are rounded, if it is the same in both halves, as it is not at a jump of the rates. Points are so near to each
 other that what is smooth has no second differences; what there is of them is rounding, which the slope does not show of
 terms that depend on time alone: J. J. More, S. M. Wild, "Estimating computational noise", SIAM Journal on Scientific
-Computing 33, 2011. A jump looks alike, but is on one of the lines only. The C engine (hybrid_model/engine/rounding.c)
-decides in the same way.
+Computing 33, 2011. A jump looks alike, but is on one of the lines only. The C engine
+(hybrid_model/engine/methods/rounding.c) decides in the same way.
 """
 
 from __future__ import annotations
