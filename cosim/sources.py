@@ -8,18 +8,21 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Linear:
-    """An output of which ``factor * value + offset`` arrives, in the unit of the input.
+    """An output of which ``factor * value + offset`` arrives, in the unit of the input, or as the number that it is.
 
     Attributes
     ----------
     source : str
         ``"slave.output"``.
     factor, offset : float
+    converted : bool
+        Whether the value is converted to the unit of the input before; else units are not looked at.
     """
 
     source: str
     factor: float = 1.0
     offset: float = 0.0
+    converted: bool = True
 
 
 Source = str | Sequence[str] | Linear

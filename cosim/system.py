@@ -232,14 +232,15 @@ class System:
     def _connection(self, target: str, source: str, given: Source) -> Connection:
         into, input_port = self._find(target, "input")
         out_of, output_port = self._find(source, "output")
-        factor, offset = _conversion(source, output_port, target, input_port)
+        as_it_is = isinstance(given, Linear) and not given.converted
+        factor, offset = (1.0, 0.0) if as_it_is else _conversion(source, output_port, target, input_port)
         _require_type(source, output_port, target, input_port)
         if input_port.discrete and not output_port.discrete:
             raise MisfitError(
                 f"{source} changes along flows, but {target} is a discrete input, which may change only at events: "
                 "sample the signal first."
             )
-        if isinstance(given, Linear):
+        if isinstance(given, Linear) and (given.factor, given.offset) != (1.0, 0.0):
             if output_port.kind != "number" or input_port.whole:
                 raise MisfitError(f"{source} -> {target} is scaled, and does not carry numbers with a fraction.")
             factor, offset = given.factor * factor, given.factor * offset + given.offset

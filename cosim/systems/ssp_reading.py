@@ -58,6 +58,7 @@ class _Reading:
         self._given: dict[Node, Any] = {}
         self._units: dict[Node, str] = {}
         self._into: dict[Node, tuple[Node, float, float]] = {}
+        self._unconverted: set[Node] = set()
 
     def definition(self, path: Path) -> SystemDefinition:
         root = self._parsed(path)
@@ -106,8 +107,8 @@ class _Reading:
             source = paths[wire.get("startElement")], wire.get("startConnector")
             target = paths[wire.get("endElement")], wire.get("endConnector")
             told = f"its connection {_told(source)} -> {_told(target)}"
-            if wire.get("suppressUnitConversion") in ("true", "1"):
-                raise self._misfit(f"{told} suppresses the conversion of units, which is not supported")
+            if _suppressed(wire):
+                self._unconverted.add(target)
             if target in self._into:
                 raise self._misfit(f"{_told(target)} is connected twice")
             self._into[target] = source, *self._scale(wire, told)
@@ -118,17 +119,18 @@ class _Reading:
         for target in self._into:
             if target[0] not in self._elements:
                 continue
-            at, factor, offset = target, 1.0, 0.0
+            at, factor, offset, converted = target, 1.0, 0.0, True
             for _ in self._into:
                 if at not in self._into:
                     break
+                converted = converted and at not in self._unconverted
                 at, by, plus = self._into[at]
                 factor, offset = factor * by, factor * plus + offset
             if at[0] in self._elements:
-                scaled = (factor, offset) != (1.0, 0.0)
-                connections[_told(target)] = Linear(_told(at), factor, offset) if scaled else _told(at)
+                plain = converted and (factor, offset) == (1.0, 0.0)
+                connections[_told(target)] = _told(at) if plain else Linear(_told(at), factor, offset, converted)
             elif at in self._given:
-                if target[1] not in self._starts[target[0]] and at in self._units:
+                if target[1] not in self._starts[target[0]] and at in self._units and converted:
                     self._units[target] = self._units[at]
                 self._starts[target[0]].setdefault(target[1], self._scaled(self._given[at], factor, offset, at))
         return connections
@@ -187,9 +189,10 @@ class _Reading:
                 found = {name: value for one in inline for name, value in self._set(one).items()}
             mapping = self._mapping(binding)
             for name, (value, unit) in found.items():
-                target, factor, offset = mapping.get(prefix + name, (prefix + name, 1.0, 0.0))
+                same = prefix + name, 1.0, 0.0, True
+                target, factor, offset, converted = mapping.get(prefix + name, same)
                 values[target] = self._scaled(value, factor, offset, (place, target))
-                if unit is not None:
+                if unit is not None and converted:
                     self._units[place, target] = unit
         return values
 
@@ -206,15 +209,16 @@ class _Reading:
                     values[name] = typed.get("value").split() if is_array else typed.get("value"), typed.get("unit")
         return values
 
-    def _mapping(self, binding: Any) -> dict[str, tuple[str, float, float]]:
-        found: dict[str, tuple[str, float, float]] = {}
+    def _mapping(self, binding: Any) -> dict[str, tuple[str, float, float, bool]]:
+        found: dict[str, tuple[str, float, float, bool]] = {}
         for element in _children(binding, "ParameterMapping"):
             source = element.get("source")
             inner = _children(element, "ParameterMapping") or [element]
             for root in [self._parsed(self._file(source, "a mapping"))] if source is not None else inner:
                 for entry in _children(root, "MappingEntry"):
                     told = f"the mapping of {entry.get('source')}"
-                    found[entry.get("source")] = entry.get("target"), *self._scale(entry, told)
+                    scale = self._scale(entry, told)
+                    found[entry.get("source")] = entry.get("target"), *scale, not _suppressed(entry)
         return found
 
     def _file(self, source: str | None, what: str) -> Path:
@@ -252,6 +256,10 @@ class _Reading:
 
 def _told(node: Node) -> str:
     return f"{node[0]}.{node[1]}" if node[0] and not node[0].endswith(".") else f"{node[0]}{node[1]}"
+
+
+def _suppressed(element: Any) -> bool:
+    return element.get("suppressUnitConversion") in ("true", "1")
 
 
 def _local(element: Any) -> str:

@@ -83,7 +83,8 @@ def write_osp(definition: SystemDefinition, system: System, folder: str | Path, 
                 _add(initial, OSP, kind, value=_text(value))
     connections = _add(root, OSP, "Connections")
     for wire in system.connections:
-        if _linear(definition, f"{wire.target}.{wire.input}") is not None:
+        linear = _linear(definition, f"{wire.target}.{wire.input}")
+        if linear is not None and (linear.factor, linear.offset) != (1.0, 0.0):
             raise MisfitError(f"{wire} is scaled, which is not written for libcosim: scale in one of the FMUs.")
         element = _add(connections, OSP, "VariableConnection")
         _add(element, OSP, "Variable", simulator=wire.source, name=wire.output)
@@ -145,7 +146,9 @@ def _add_connections(
         ends = {"startElement": wire.source, "startConnector": output, "endElement": wire.target, "endConnector": into}
         element = _add(parent, SSD, "Connection", **ends)
         linear = _linear(definition, f"{wire.target}.{into}")
-        if linear is not None:
+        if linear is not None and not linear.converted:
+            element.set("suppressUnitConversion", "true")
+        if linear is not None and (linear.factor, linear.offset) != (1.0, 0.0):
             _add(element, SSC, "LinearTransformation", factor=repr(linear.factor), offset=repr(linear.offset))
 
 

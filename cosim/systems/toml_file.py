@@ -73,7 +73,7 @@ def _source(path: Path, target: str, given: Any) -> Source:
         and len(given) == 1 + len(numbers)
         and all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in numbers.values())
     ):
-        return Linear(given["from"], **{name: float(value) for name, value in numbers.items()})
+        return Linear(given["from"], float(numbers.get("factor", 1.0)), float(numbers.get("offset", 0.0)))
     raise MisfitError(
         f"{path}: connections.{target!r} is {given!r}: give the name of an output, a list of them, or "
         '{ from = "a.y", factor = 2.0, offset = 0.0 }. Names with points are quoted: "b.u" = "a.y".'

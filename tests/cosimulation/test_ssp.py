@@ -17,7 +17,7 @@ from cosim.system import System
 from cosim.systems.assembly import assemble
 from cosim.systems.definition import Component, SystemDefinition
 from cosim.systems.files import read_system
-from cosim.systems.ssp_reading import read_ssp
+from cosim.systems.ssp_reading import _Reading, read_ssp
 from cosim.systems.ssp_writing import write_osp, write_ssp
 
 SYSTEM = """
@@ -259,6 +259,51 @@ def test_parameters_in_another_unit_than_the_fmus_are_refused(fmi, tmp_path, exp
             with pytest.raises(MisfitError, match=r"rod\.length is in 'cm', but the FMU has it in 'm'"):
                 read_ssp(path)
     assert read_ssp(path).components[0].start == {"length": "250.0"}
+
+
+class Metres(hm.HybridAutomaton):
+    height = hm.Parameter(2.0, unit="m")
+    y = hm.Output(unit="m")
+
+    def outputs(self, s):
+        return {"y": s.height}
+
+
+class Millimetres(hm.HybridAutomaton):
+    u = hm.Input(0.0, unit="mm")
+    y = hm.Output(unit="mm")
+
+    def outputs(self, s):
+        return {"y": s.u}
+
+
+@pytest.mark.parametrize("suppressed", [True, False])
+def test_units_are_converted_unless_a_connection_suppresses_it(suppressed, tmp_path, exported):
+    """2 m are 2000 mm; without conversion the number is what it was. It is written as it was read."""
+    fmus = {"a": exported(Metres(), "metres"), "b": exported(Millimetres(), "millimetres")}
+    source = Linear("a.y", converted=False) if suppressed else "a.y"
+    definition = SystemDefinition("units", [Component(n, "fmu", str(p)) for n, p in fmus.items()], {"b.u": source})
+    path = write_ssp(definition, assemble(definition), tmp_path / "units.ssp")
+    again = read_ssp(path)
+    assert again.connections == {"b.u": source}
+    assert run_fixed_step(assemble(again), 1.0, 0.5).final["b.y"] == (2.0 if suppressed else 2000.0)
+
+
+def test_units_of_parameters_are_not_looked_at_where_a_mapping_suppresses_it(by_hand, tmp_path):
+    path = by_hand()
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    members["a.ssv"] = members["a.ssv"].replace(b"<ssv:Real ", b'<ssv:Real unit="kg" ')
+    for suppressed in (b"", b'suppressUnitConversion="true" '):
+        members["a.ssm"] = MAPPING.encode().replace(b"MappingEntry ", b"MappingEntry " + suppressed)
+        with zipfile.ZipFile(path, "w") as archive:
+            for name, content in members.items():
+                archive.writestr(name, content)
+        reading = _Reading(tmp_path, "hand")
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(tmp_path)
+        reading.definition(tmp_path / "SystemStructure.ssd")
+        assert (("a", "weights[1]") in reading._units) != bool(suppressed)
 
 
 def test_a_path_out_of_the_archive_is_refused(by_hand, tmp_path):
