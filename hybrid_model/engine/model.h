@@ -87,8 +87,8 @@ typedef struct {
     ModelFunction forward, reverse, start_forward, start_reverse;
     /* -> d(dx/dt)/dx (n_states^2, by columns), d(dx/dt)/dt (n_states); NULL where `forward` is to do. */
     ModelFunction jacobian;
-    /* Rates of quadratures that are affine in values which only jumps change, those at the places `held` in z and u, one
-       after the other: -> the rates without them (n_states), n_factors functions of time, each a part of the rate
+    /* Rates of quadratures that are affine in values which only jumps change, those at the places `held` in z and u,
+       one after the other: -> the rates without them (n_states), n_factors functions of time, each a part of the rate
        `factor_rows` when multiplied by the value number `factor_columns` of those held.  They depend on nothing else
        than what is at the places `factor_keys` in z, u and p.  NULL, and no factors, where there are none. */
     ModelFunction factors;

@@ -72,7 +72,9 @@ typedef struct {
 
 typedef struct Method Method;
 
-/* The series of the factors on pieces of time, in rows: see held_factors.c. */
+/* The series of the factors on pieces of time, in rows: see held_factors.c.  Of a row: the piece, how many terms the
+   series have, 0 for a row that is empty, and then what they depend on. */
+enum { PIECE_BEGIN, PIECE_END, PIECE_TERMS, PIECE_KEYS };
 typedef struct {
     double *rows, *values, *vectors, *zeros, *sums;
     size_t n_rows, width;     /* so many rows, a power of two */
@@ -230,6 +232,15 @@ void engine_segment_move(Engine *engine, double t);
    changes by it, so that a run is the same whoever looks at it. */
 void engine_catch_up(Engine *engine);
 
+/* factor_pieces.c */
+/* Memory for the factors of `parts` points that take turns; false without memory. */
+bool engine_keep_factors(Engine *engine, size_t parts);
+void engine_free_factors(Engine *engine);
+/* The point's values are about to become those of `z`. */
+void engine_watch_factors(const Engine *engine, const Point *point, const double *z);
+/* A value of the live point has been set. */
+void engine_note_factors(const Engine *engine, Bank bank, size_t index);
+
 /* block.c */
 /* Whether the flow may turn out to be stiff in a run. */
 bool engine_may_show_stiffness(const Model *model);
@@ -297,15 +308,6 @@ void engine_choose_method(Engine *engine);
 /* Looks at an accepted step for what makes a flow stiff.  Where the method is about to change, and where it is one for
    stiff flows, whose steps differ by orders of magnitude, the pace so far says nothing: no flow creeps. */
 void engine_watch_stiffness(Engine *engine, const Point *point);
-
-/* held_factors.c */
-/* Memory for the factors of `parts` points that take turns; false without memory. */
-bool engine_keep_factors(Engine *engine, size_t parts);
-void engine_free_factors(Engine *engine);
-/* The point's values are about to become those of `z`. */
-void engine_watch_factors(const Engine *engine, const Point *point, const double *z);
-/* A value of the live point has been set. */
-void engine_note_factors(const Engine *engine, Bank bank, size_t index);
 
 /* integrate.c */
 /* A step may begin at the point: its rates are in step->k[0], if they are not known otherwise. */

@@ -14,11 +14,7 @@
 #include "chebyshev.h"
 #include "method.h"
 
-/* Of a row: the piece, how many terms the series have, 0 for a row that is empty, and then what they depend on. */
-enum { BEGIN, END, TERMS, KEYS };
-
 #define COARSE 2
-#define MOST_BYTES 8388608
 #define MOST_TRIALS 12
 /* A piece is no longer than so many times the one before. */
 #define LONGER 10.0
@@ -34,34 +30,6 @@ static size_t series_count(const Model *m)
     return m->n_states + m->n_factors;
 }
 
-bool engine_keep_factors(Engine *engine, size_t parts)
-{
-    const Model *m = engine->model;
-    Factors *of = &engine->factors;
-    size_t n = series_count(m);
-    if (!m->factors || of->rows)
-        return true;
-    of->width = KEYS + m->n_factor_keys + (N_SERIES + 1) * n;
-    size_t most = MOST_BYTES / (of->width * sizeof(double));
-    for (of->n_rows = 1; of->n_rows < 2 * parts && 2 * of->n_rows <= most;)
-        of->n_rows *= 2;
-    of->rows = calloc(of->n_rows * of->width, sizeof(double));
-    of->values = malloc((N_NODES * n + m->n_factor_keys + 1) * sizeof(double));
-    of->vectors = malloc(N_SERIES * n * sizeof(double));
-    of->zeros = calloc(n, sizeof(double));
-    of->sums = malloc(N_SERIES * m->n_states * sizeof(double));
-    return of->rows && of->values && of->vectors && of->zeros && of->sums;
-}
-
-void engine_free_factors(Engine *engine)
-{
-    free(engine->factors.rows);
-    free(engine->factors.values);
-    free(engine->factors.vectors);
-    free(engine->factors.zeros);
-    free(engine->factors.sums);
-}
-
 /* The value at a place in z, u and p, one after the other. */
 static double value_at(const Engine *engine, const Point *point, size_t place)
 {
@@ -72,47 +40,14 @@ static double value_at(const Engine *engine, const Point *point, size_t place)
     return place < m->n_inputs ? engine->u[place] : engine->p[place - m->n_inputs];
 }
 
-static void forget(const Point *point)
-{
-    point->progress[FACTORS_BEGIN] = point->progress[FACTORS_END] = point->progress[FACTORS_FOUND] = 0.0;
-}
-
-void engine_watch_factors(const Engine *engine, const Point *point, const double *z)
-{
-    const Model *m = engine->model;
-    for (size_t k = 0; k < m->n_factor_keys && m->factor_keys[k] < m->n_discrete; k++)
-        if (z[m->factor_keys[k]] != point->z[m->factor_keys[k]]) {
-            forget(point);
-            return;
-        }
-}
-
-void engine_note_factors(const Engine *engine, Bank bank, size_t index)
-{
-    const Model *m = engine->model;
-    if (bank == BANK_STATE || m->n_factor_keys == 0)
-        return;
-    size_t before = bank == BANK_DISCRETE ? 0 : bank == BANK_INPUT ? m->n_discrete : m->n_discrete + m->n_inputs;
-    size_t low = 0, high = m->n_factor_keys;
-    while (high - low > 1) {
-        size_t middle = low + (high - low) / 2;
-        if (m->factor_keys[middle] <= before + index)
-            low = middle;
-        else
-            high = middle;
-    }
-    if (m->factor_keys[low] == before + index)
-        forget(&engine->live);
-}
-
 /* Begins a piece with what its series depend on. */
 static void begin_row(const Engine *engine, const Point *point, double *row)
 {
-    row[BEGIN] = point->progress[FACTORS_BEGIN];
-    row[END] = point->progress[FACTORS_END];
-    row[TERMS] = 0.0;
+    row[PIECE_BEGIN] = point->progress[FACTORS_BEGIN];
+    row[PIECE_END] = point->progress[FACTORS_END];
+    row[PIECE_TERMS] = 0.0;
     for (size_t k = 0; k < engine->model->n_factor_keys; k++)
-        row[KEYS + k] = value_at(engine, point, engine->model->factor_keys[k]);
+        row[PIECE_KEYS + k] = value_at(engine, point, engine->model->factor_keys[k]);
 }
 
 /* The place for a piece among the rows. */
@@ -120,7 +55,7 @@ static double *place_of(const Engine *engine, const double *head)
 {
     const Factors *of = &engine->factors;
     uint64_t mixed = 0, bits;
-    for (size_t k = 0; k < KEYS + engine->model->n_factor_keys; k++) {
+    for (size_t k = 0; k < PIECE_KEYS + engine->model->n_factor_keys; k++) {
         memcpy(&bits, &head[k], sizeof bits);
         mixed = (mixed ^ bits) * UINT64_C(0x9E3779B97F4A7C15);
         mixed ^= mixed >> 29;
@@ -154,8 +89,8 @@ static double make_series(Engine *engine, const Point *point, double *row)
     const Model *m = engine->model;
     Factors *of = &engine->factors;
     size_t n = series_count(m);
-    double begin = row[BEGIN], end = row[END], error = INFINITY, *series = of->vectors;
-    double *rows = row + KEYS + m->n_factor_keys, *tails = rows + N_SERIES * n;
+    double begin = row[PIECE_BEGIN], end = row[PIECE_END], error = INFINITY, *series = of->vectors;
+    double *rows = row + PIECE_KEYS + m->n_factor_keys, *tails = rows + N_SERIES * n;
     for (size_t stride = COARSE, known = 2 * FINEST; stride > 0; known = stride, stride /= 2) {
         for (size_t j = 0; j <= FINEST; j += stride) {
             double t = j == FINEST ? end : begin + engine_node(j) * (end - begin);
@@ -164,7 +99,7 @@ static double make_series(Engine *engine, const Point *point, double *row)
         }
         size_t n_terms = engine_integrate_series(n, stride, end - begin, of->zeros, of->values, series, tails);
         double size = largest_of(series + n, n * (n_terms - 1)), tail = largest_of(tails, n);
-        row[TERMS] = (double)n_terms;
+        row[PIECE_TERMS] = (double)n_terms;
         if (!isfinite(size) || !isfinite(tail))
             return INFINITY;
         error = tail > 0.0 ? tail / (engine->options.relative_tolerance * size) : 0.0;
@@ -190,12 +125,12 @@ static void find_piece(Engine *engine, const Point *point, double limit)
         progress[FACTORS_END] = span >= limit - t ? limit : t + span;
         begin_row(engine, point, head);
         double *row = place_of(engine, head);
-        size_t length = (KEYS + engine->model->n_factor_keys) * sizeof(double);
-        double terms = row[TERMS];
-        row[TERMS] = 0.0;
+        size_t length = (PIECE_KEYS + engine->model->n_factor_keys) * sizeof(double);
+        double terms = row[PIECE_TERMS];
+        row[PIECE_TERMS] = 0.0;
         bool there = terms > 0.0 && memcmp(row, head, length) == 0;
         if (there) {
-            row[TERMS] = terms;
+            row[PIECE_TERMS] = terms;
             progress[FACTORS_FOUND] = 1.0;
             return;
         }
@@ -205,7 +140,7 @@ static void find_piece(Engine *engine, const Point *point, double limit)
             progress[FACTORS_FOUND] = 1.0;
             return;
         }
-        row[TERMS] = 0.0;
+        row[PIECE_TERMS] = 0.0;
         span *= isfinite(error) ? fmin(fmax(0.1, 0.9 * pow(error, -1.0 / (FINEST + 1.0))), 0.7) : 0.1;
     }
     /* No series is looked for again up to there. */
@@ -219,15 +154,15 @@ static const double *row_of(Engine *engine, const Point *point)
     double *head = engine->factors.values;
     begin_row(engine, point, head);
     double *row = place_of(engine, head);
-    size_t length = (KEYS + engine->model->n_factor_keys) * sizeof(double);
-    head[TERMS] = row[TERMS];
-    if (row[TERMS] > 0.0 && memcmp(row, head, length) == 0)
+    size_t length = (PIECE_KEYS + engine->model->n_factor_keys) * sizeof(double);
+    head[PIECE_TERMS] = row[PIECE_TERMS];
+    if (row[PIECE_TERMS] > 0.0 && memcmp(row, head, length) == 0)
         return row;
-    head[TERMS] = 0.0;
+    head[PIECE_TERMS] = 0.0;
     memcpy(row, head, length);
     if (make_series(engine, point, row) <= 1.0)
         return row;
-    row[TERMS] = 0.0;
+    row[PIECE_TERMS] = 0.0;
     return NULL;
 }
 
@@ -235,7 +170,7 @@ static const double *row_of(Engine *engine, const Point *point)
 static void sum_series(Engine *engine, const Point *point, const double *row, double *tails)
 {
     const Model *m = engine->model;
-    const double *series = row + KEYS + m->n_factor_keys, *of_series = series + N_SERIES * series_count(m);
+    const double *series = row + PIECE_KEYS + m->n_factor_keys, *of_series = series + N_SERIES * series_count(m);
     double *sums = engine->factors.sums, *vectors = engine->step.vectors;
     size_t n = m->n_states;
     engine_copy(sums, series, N_SERIES * n);
@@ -322,7 +257,7 @@ bool engine_step_of_factors(Engine *engine, const Point *point, double limit)
     step->begin = progress[FACTORS_BEGIN];
     step->end = progress[FACTORS_END];
     step->t1 = fmin(limit, step->end);
-    step->n_terms = (size_t)row[TERMS];
+    step->n_terms = (size_t)row[PIECE_TERMS];
     bool whole = step->t1 - step->t0 > 0.5 * (step->end - step->begin);
     step->n_windows = whole && step->n_terms > N_SERIES - FINEST / COARSE ? COARSE : 1;
     sum_series(engine, point, row, engine->quadrature.tails);

@@ -23,8 +23,8 @@ struct Method {
     bool is_exact;            /* the interpolation is the step itself */
     bool remembers;           /* steps need not begin short after a jump */
     double segment_part;      /* a step that communication points are read from is so much shorter than it may be */
-    /* Whether a step from the point may be known without its rates; makes that step, at most to `limit`, with its states in
-       step->x1.  NULL for methods that know none. */
+    /* Whether a step from the point may be known without its rates; makes that step, at most to `limit`, with its
+       states in step->x1.  NULL for methods that know none. */
     bool (*knows)(const Engine *engine, const Point *point);
     bool (*known)(Engine *engine, const Point *point, double limit);
     /* Makes the step to step->t1: the state there in step->x1, the rates there in step->k[N_STAGES - 1], and the error
@@ -37,7 +37,8 @@ struct Method {
     void (*prepare)(Engine *engine);
     /* Evaluates vectors, of which those behind n_terms are zero, at the part a of a step, from 0 to 1. */
     void (*interpolate)(const double *vectors, size_t n_terms, size_t n_states, double a, double *x);
-    /* The same for N_SAMPLES parts at once, whose states are put one after the other.  NULL where that spares nothing. */
+    /* The same for N_SAMPLES parts at once, whose states are put one after the other.  NULL where that spares
+       nothing. */
     void (*interpolate_samples)(const double *vectors, size_t n_terms, size_t n_states, const double *parts, double *x);
     /* The vectors of the straight way from x0 to x1. */
     void (*straight)(const double *x0, const double *x1, size_t n_states, double *vectors);
