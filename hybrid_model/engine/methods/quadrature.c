@@ -94,7 +94,8 @@ static bool probe(Engine *engine, const Point *point, double t)
     const Quadrature *q = &engine->quadrature;
     size_t n = engine->model->n_states;
     if (t >= step->t0 && t <= step->t1 && step->t0 < step->t1) {
-        engine_series_at(step->vectors, step->n_terms, n, (t - step->begin) / (step->end - step->begin), engine->probe_x);
+        double part = (t - step->begin) / (step->end - step->begin);
+        engine_series_at(step->vectors, step->n_terms, n, part, engine->probe_x);
         return true;
     }
     size_t n_terms;
