@@ -4,7 +4,7 @@ Rates are looked at along three short lines. Their slope tells how large the ter
 how they are rounded, if it is the same in both halves, as it is not at a jump of the rates. Points are so near to each
 other that what is smooth has no second differences; what there is of them is rounding, which the slope does not show of
 terms that depend on time alone: J. J. More, S. M. Wild, "Estimating computational noise", SIAM Journal on Scientific
-Computing 33, 2011. A jump looks alike, but is on one of the lines only. The C engine
+Computing 33, 2011. A jump looks alike, but is not on all of the lines. The C engine
 (hybrid_model/engine/methods/rounding.c) decides in the same way.
 """
 
@@ -51,7 +51,7 @@ def rounding_of_rates(point: Point, t: float, x: FloatArray, step: float) -> Flo
         found = np.fmax(found, _by_slope(seen))
         second = np.diff(seen, n=2, axis=0)
         differences.append(np.sqrt((second**2).mean(axis=0) / OF_SECOND_DIFFERENCES))
-    found = np.maximum(found, np.median(differences, axis=0))
+    found = np.maximum(found, np.min(differences, axis=0))
     return np.where(np.isfinite(found), found, 0.0)
 
 

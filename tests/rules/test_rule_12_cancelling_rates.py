@@ -110,3 +110,24 @@ def test_a_ring_that_starts_on_a_cosine_runs_on(scheduler, agents, t_end):
     assert len(found) > 4
     # The same ring about another mean has no small states; agents that are mirror images broadcast together.
     np.testing.assert_allclose(found, events(0.37 + initial), rtol=0, atol=1e-9)
+
+
+class Gated(hm.HybridAutomaton):
+    """A rate that jumps where sin(w t) changes sign: time and the parameter move the gate alike."""
+
+    x = hm.State(0.0, output=True)
+    w = hm.Parameter(7.3)
+
+    def flow_map(self, s):
+        return {"x": np.where(np.sin(s.w * s.t) > 0.0, 0.7, -0.4)}
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+def test_a_gate_that_a_parameter_moves_is_no_rounding(engine):
+    """Steps across jumps of the rates, taken for rounding, were off by 2e-8."""
+    w, end = 7.3, 4.0
+    arc = hm.simulate(Gated(), end, engine=engine)
+    edges = np.append(np.arange(0.0, end, np.pi / w), end)
+    rates = np.where(np.sin(0.5 * w * (edges[1:] + edges[:-1])) > 0.0, 0.7, -0.4)
+    exact = np.concatenate([[0.0], np.cumsum(rates * np.diff(edges))])
+    np.testing.assert_allclose(arc.at("x", edges), exact, rtol=0, atol=2e-11)

@@ -78,3 +78,20 @@ def test_events_are_where_the_closed_form_has_them(w):
         t = jump.t
     assert marks > 10
     assert run.arcs["walker"].at("x", end) == pytest.approx(walked(w, heard, mark, x, t, end), abs=1e-12)
+
+
+class Pulsed(Walker):
+    """Where it goes is heard in one pulse, and hardly so before and after."""
+
+    def flow_map(self, s):
+        return {"x": s.u * np.where(np.abs(s.t - 41.0) < 2.0, 1.0, 1e-3)}
+
+
+def test_a_pulse_between_the_coarse_nodes_of_a_piece_is_seen():
+    """Functions far apart in time from all else are looked at on the fine nodes too before a series is taken."""
+    parts = {"speaker": Speaker(first=17.3, period=17.3), "walker": Pulsed()}
+    network = hm.Composition("walk", parts, {"walker.u": "speaker.said"})
+    found = hm.simulate_network(network, 60.0, engine="native").event_times("walker", "mark")
+    together = hm.simulate(network, 60.0).event_times("walker.mark")
+    assert len(found) > 50
+    np.testing.assert_allclose(found, together, rtol=0, atol=1e-8)

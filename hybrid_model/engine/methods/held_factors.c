@@ -15,6 +15,8 @@
 #include "method.h"
 
 #define COARSE 2
+/* What a coarse series leaves out by its own count is so many times less than what it may be off. */
+#define CLOSE 10.0
 #define MOST_TRIALS 12
 /* A piece is no longer than so many times the one before. */
 #define LONGER 10.0
@@ -83,12 +85,22 @@ static double largest_of(const double *values, size_t n)
     return largest;
 }
 
+/* Whether series are those of the rows, but for `close`. */
+static bool say_the_same(const double *series, const double *rows, size_t n, double close)
+{
+    for (size_t i = 0; i < n; i++)
+        for (size_t k = 0; k < N_SERIES; k++)
+            if (fabs(series[k * n + i] - rows[N_SERIES * i + k]) > close)
+                return false;
+    return true;
+}
+
 /* Makes the series on a piece, whose head is there; the error in units of the tolerance. */
 static double make_series(Engine *engine, const Point *point, double *row)
 {
     const Model *m = engine->model;
     Factors *of = &engine->factors;
-    size_t n = series_count(m);
+    size_t n = series_count(m), coarse = 0;
     double begin = row[PIECE_BEGIN], end = row[PIECE_END], error = INFINITY, *series = of->vectors;
     double *rows = row + PIECE_KEYS + m->n_factor_keys, *tails = rows + N_SERIES * n;
     for (size_t stride = COARSE, known = 2 * FINEST; stride > 0; known = stride, stride /= 2) {
@@ -103,12 +115,19 @@ static double make_series(Engine *engine, const Point *point, double *row)
         if (!isfinite(size) || !isfinite(tail))
             return INFINITY;
         error = tail > 0.0 ? tail / (engine->options.relative_tolerance * size) : 0.0;
-        if (error <= 1.0)
-            break;
+        if (error > 1.0)
+            continue;
+        /* Coarse nodes may step over a pulse, which the finer ones see. */
+        double close = CLOSE * engine->options.relative_tolerance * size;
+        if (coarse > 0 && say_the_same(series, rows, n, close)) {
+            row[PIECE_TERMS] = (double)coarse;
+            return error;
+        }
+        coarse = n_terms;
+        for (size_t i = 0; i < n; i++)
+            for (size_t k = 0; k < N_SERIES; k++)
+                rows[N_SERIES * i + k] = series[k * n + i];
     }
-    for (size_t i = 0; i < n; i++)
-        for (size_t k = 0; k < N_SERIES; k++)
-            rows[N_SERIES * i + k] = series[k * n + i];
     return error;
 }
 

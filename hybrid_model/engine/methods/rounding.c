@@ -5,7 +5,7 @@
    and so how they are rounded, if it is the same in both halves, as it is not at a jump of the rates. Points are so
    near to each other that what is smooth has no second differences; what there is of them is rounding, which the
    slope does not show of terms that depend on time alone: J. J. More, S. M. Wild, "Estimating computational noise",
-   SIAM Journal on Scientific Computing 33, 2011. A jump looks alike, but is on one of the lines only. */
+   SIAM Journal on Scientific Computing 33, 2011. A jump looks alike, but is not on all of the lines. */
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -105,12 +105,6 @@ static bool look(Engine *engine, const Given *given, size_t line, double later)
     return true;
 }
 
-/* Of three numbers. */
-static double middle(double a, double b, double c)
-{
-    return fmax(fmin(a, b), fmin(fmax(a, b), c));
-}
-
 bool engine_find_rounding(Engine *engine, double t, const double *x, const double *z, double h)
 {
     Rounding *of = &engine->rounding;
@@ -120,7 +114,8 @@ bool engine_find_rounding(Engine *engine, double t, const double *x, const doubl
         if (!look(engine, &given, line, fmax(later, engine_time_ulp(t))))
             return false;
     for (size_t i = 0; i < engine->model->n_states; i++) {
-        of->rates[i] = fmax(of->rates[i], middle(of->differences[0][i], of->differences[1][i], of->differences[2][i]));
+        double least = fmin(fmin(of->differences[0][i], of->differences[1][i]), of->differences[2][i]);
+        of->rates[i] = fmax(of->rates[i], least);
         if (!isfinite(of->rates[i]))
             of->rates[i] = 0.0;
     }
