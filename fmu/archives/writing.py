@@ -54,7 +54,8 @@ def package(
         )
     with (
         replacing(fmu_path) as temporary,
-        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive,
+        # The highest level takes twice as long and saves three bytes in a thousand.
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive,
     ):
         for name in sorted(members):
             entry = zipfile.ZipInfo(name, ARCHIVE_DATE)
