@@ -219,7 +219,6 @@ def test_a_modal_automaton_and_a_dwell_time():
         ({"limit": 0.05}, "parameter limit is set to 0.05, outside its range from 0.1 to inf"),
         ({"limit": np.nan}, "parameter limit = nan is not finite"),
         ({"limit": "high"}, "parameter limit = 'high' is not a number"),
-        ({"limit": hm.Signal(lambda t: 1.0, [np.inf])}, "finite times"),
         ({"limits": 1.0}, "limits"),
     ],
 )

@@ -149,6 +149,6 @@ def framework_words() -> frozenset[str]:
     found = set(UNBOUND)
     for cls in _FRAMEWORK:
         found.update(vars(cls), inspect.get_annotations(cls))
-        for function in filter(inspect.isfunction, vars(cls).values()):
+        for function in map(inspect.unwrap, filter(inspect.isfunction, vars(cls).values())):
             found.update(item.argval for item in dis.get_instructions(function) if item.opname == "STORE_ATTR")
     return frozenset(word for word in found - {_FOR_COPIES} if not word.startswith(("__", "_abc")))
