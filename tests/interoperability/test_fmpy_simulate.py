@@ -9,7 +9,7 @@ import fmpy
 import numpy as np
 import pytest
 from catalogue import cases
-from executions import reference, shown, step_values, values_of
+from executions import reference, shown, starts, step_inputs, values_of
 
 import hybrid_model as hm
 from hybrid_model.declare.variables import Kind, element_names
@@ -44,13 +44,20 @@ def signals(case):
     names = [name for variable in inputs for name in element_names(variable)]
     if not names:
         return None
+    given, start = step_inputs(case), starts(case.automaton)
+
+    def values(variable, t):
+        if variable.name in given:
+            return np.ravel(given[variable.name].value(t))
+        return [start[name] for name in element_names(variable)]
+
     changes = {t for steps in case.steps.values() for t, _ in steps}
     times = sorted([0.0, case.t_end, *changes, *changes])
     rows, before = [], 0.0
     for t in times:
         late = t == before or t == 0.0
         at = t if late else np.nextafter(t, 0.0)
-        rows.append((t, *(float(x) for v in inputs for x in np.ravel(step_values(case, v, at)))))
+        rows.append((t, *(float(x) for v in inputs for x in values(v, at))))
         before = t
     return np.array(rows, dtype=[("time", float), *((name, float) for name in names)])
 
