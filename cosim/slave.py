@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
 
-from cosim.errors import MisfitError
+from cosim.errors import CosimError, MisfitError
 from fmu.importer.values import Value
 from hybrid_model.schedule.blocks import Block
 
@@ -154,11 +154,11 @@ class Slave(Block):
 
     def slopes(self, names: Sequence[str]) -> Callable[[], list[float]]:
         """Return what gives the present derivatives by time of outputs among `sloped`."""
-        raise NotImplementedError
+        raise CosimError(f"{self.name} gives no derivatives of its outputs: ask for those in its list `sloped` alone.")
 
     def lead(self, lines: Mapping[str, tuple[float, float]]) -> None:
         """Let inputs among `interpolating` have values at the start of the next step, and slopes in it."""
-        raise NotImplementedError
+        raise CosimError(f"{self.name} holds its inputs in a step: lead those in its list `interpolating` alone.")
 
     def parse(self, name: str, text: str) -> Value:
         """Return the value of a variable that a text says, for `set`.

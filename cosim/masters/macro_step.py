@@ -198,8 +198,8 @@ class MacroSteps:
             What they carry at the end; empty if a slave was early.
         """
         outcome = Outcome()
-        self._changes.follow(0.5 * (t + t_next))
         middle = 0.5 * (t + t_next)
+        self._changes.follow(middle)
         expected = self.history.about(middle) if self._leads else [self.history.at(middle)]
         for name, slave in self._system.slaves.items():
             self._lead(name, expected, t_next - t)

@@ -79,15 +79,13 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool 
         slave.begin()
 
 
-def transfer_start(system: System, connection: Connection, known: dict[tuple[str, str], float]) -> bool:
-    """Transfer one start value; return whether it was news to the input."""
+def transfer_start(system: System, connection: Connection, known: dict[tuple[str, str], float]) -> None:
+    """Transfer one start value, if it is news to the input."""
     at = _end(connection)
     value = connection.carried(system.slaves[connection.source].get(connection.output))
-    if at in known and system.settled(value, known[at]):
-        return False
-    known[at] = value
-    system.slaves[connection.target].set(connection.input, value)
-    return True
+    if at not in known or not system.settled(value, known[at]):
+        known[at] = value
+        system.slaves[connection.target].set(connection.input, value)
 
 
 def _end(connection: Connection) -> tuple[str, str]:

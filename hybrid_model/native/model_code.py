@@ -34,9 +34,8 @@ def model_code(traced: Trace | NetworkTrace) -> str:
     str
         A C99 translation unit that defines ``const Model model``.
     """
-    held = _held(traced)
-    maps, work = _maps(traced, held, derivatives=True, jacobian=traced.automaton.stiff is True)
-    model = model_definition(traced, work, traced.automaton.name, starts=True, held=held)
+    maps, work = _maps(traced, derivatives=True, jacobian=traced.automaton.stiff is True)
+    model = model_definition(traced, work, traced.automaton.name, starts=True)
     tables = [*_starts(traced.layout), *model_tables(traced.automaton, traced.layout)]
     return "\n".join([_PRELUDE, maps, *tables, model])
 
@@ -59,18 +58,15 @@ def run_code(traced: Trace | NetworkTrace, *, jacobian: bool = False) -> str:
     str
         A C99 translation unit that defines ``const Model model``, for `hybrid_model.native.build.libraries`.
     """
-    held = _held(traced)
+    # Of use to networks that run part by part alone, which are no FMUs of one automaton.
+    held = held_factors(traced) if isinstance(traced, Trace) else None
     maps, work = _maps(traced, held, derivatives=False, jacobian=jacobian or traced.automaton.stiff is True)
     model = model_definition(traced, work, type(traced.automaton).__name__, held=held)
     return "\n".join([_PRELUDE, maps, *model_tables(traced.automaton, traced.layout), model])
 
 
-def _held(traced: Trace | NetworkTrace) -> HeldFactors | None:
-    return held_factors(traced) if isinstance(traced, Trace) else None
-
-
 def _maps(
-    traced: Trace | NetworkTrace, held: HeldFactors | None, *, derivatives: bool, jacobian: bool
+    traced: Trace | NetworkTrace, held: HeldFactors | None = None, *, derivatives: bool, jacobian: bool
 ) -> tuple[str, Sequence[int]]:
     """Return the definitions of the maps and of what follows from them, and the sizes of the work arrays they need."""
     if isinstance(traced, NetworkTrace):

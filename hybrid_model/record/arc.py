@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -107,16 +107,7 @@ class HybridArc:
 
     def __getitem__(self, name: str) -> FloatArray:
         """Return a variable's samples, shape (n, *shape): a state, input, parameter or output, or ``v[1]`` of them."""
-        shape, part = self.variable(name).shape, self._read.part(name)
-        if part is None:
-            states, held = sampled_states(self._flows), held_in(self._flows, self._numbers)
-            return self._read.column(name, self.t, states, held)
-        # Of a large network one state is read at the cost of one, not of all.
-        if self.variable(name).kind is Kind.DISCRETE:
-            values = held_in(self._flows, self._numbers, part)
-        else:
-            values = sampled_states(self._flows, part)
-        return values.reshape(len(self.t), *shape)
+        return self._column(name, self.t, self._numbers, lambda part: sampled_states(self._flows, part))
 
     def variable(self, name: str) -> Variable:
         """Return the declaration of a variable: its unit, description, shape.
@@ -162,16 +153,25 @@ class HybridArc:
             times, counts = np.broadcast_arrays(times, np.asarray(j))
             pairs = zip(times.ravel(), counts.ravel(), strict=True)
             numbers = np.array([self._number_on(float(time), count) for time, count in pairs], dtype=np.int64)
-        return self._column(name, times.ravel(), numbers).reshape(times.shape + shape)
+        flat = times.ravel()
+        values = self._column(name, flat, numbers, lambda part: states_at(self._flows, numbers, flat, part))
+        return values.reshape(times.shape + shape)
 
-    def _column(self, name: str, times: FloatArray, numbers: npt.NDArray[np.int64]) -> FloatArray:
+    def _column(
+        self,
+        name: str,
+        times: FloatArray,
+        numbers: npt.NDArray[np.int64],
+        states: Callable[[slice], FloatArray],
+    ) -> FloatArray:
+        """Return a variable at times (s) in the flows of those numbers, where `states` gives a part of the states."""
         part = self._read.part(name)
         if part is None:
-            states = states_at(self._flows, numbers, times)
-            return self._read.column(name, times, states, held_in(self._flows, numbers))
-        if self.variable(name).kind is Kind.DISCRETE:
-            return held_in(self._flows, numbers, part)
-        return states_at(self._flows, numbers, times, part)
+            return self._read.column(name, times, states(slice(None)), held_in(self._flows, numbers))
+        # Of a large network one state is read at the cost of one, not of all.
+        variable = self.variable(name)
+        values = held_in(self._flows, numbers, part) if variable.kind is Kind.DISCRETE else states(part)
+        return values.reshape(len(times), *variable.shape)
 
     # Parts of a run.
 

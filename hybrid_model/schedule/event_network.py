@@ -143,7 +143,7 @@ def _parts(
     solver: Solver,
     zeno: ZenoGuard,
 ) -> dict[str, Execution]:
-    """Return the parts of a composition at their start; those of arrays begin in the engine."""
+    """Return the parts of a composition at their start."""
     _require_discrete(network)
     return _executions(network, *span, inputs, solver, zeno)
 
