@@ -153,11 +153,23 @@ class Slave(Block):
         """Return the present value of a scalar variable: a `Value`."""
 
     def slopes(self, names: Sequence[str]) -> Callable[[], list[float]]:
-        """Return what gives the present derivatives by time of outputs among `sloped`."""
+        """Return what gives the present derivatives by time of outputs among `sloped`.
+
+        Raises
+        ------
+        CosimError
+            If the block gives no derivatives of its outputs.
+        """
         raise CosimError(f"{self.name} gives no derivatives of its outputs: ask for those in its list `sloped` alone.")
 
     def lead(self, lines: Mapping[str, tuple[float, float]]) -> None:
-        """Let inputs among `interpolating` have values at the start of the next step, and slopes in it."""
+        """Let inputs among `interpolating` have values at the start of the next step, and slopes in it.
+
+        Raises
+        ------
+        CosimError
+            If the block holds its inputs in a step.
+        """
         raise CosimError(f"{self.name} holds its inputs in a step: lead those in its list `interpolating` alone.")
 
     def parse(self, name: str, text: str) -> Value:
