@@ -6,13 +6,14 @@ CasADi's matrices do not have, and says what to write where a value cannot be a 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from hybrid_model.errors import TraceError
+from hybrid_model.native.symbol_columns import Column, at_once, sum_of, taken_apart
 
 
 def _modulo(a: Any, b: Any) -> Any:
@@ -76,7 +77,15 @@ _IDENTITY = {np.add: 0.0, np.multiply: 1.0, np.logical_and: True, np.logical_or:
 
 
 class Symbols(np.ndarray[Any, np.dtype[Any]]):
-    """An array whose elements are scalar CasADi expressions; also used, with shape (), for scalars."""
+    """An array whose elements are scalar CasADi expressions; also used, with shape (), for scalars.
+
+    Attributes
+    ----------
+    column : Column or None
+        See `hybrid_model.native.symbol_columns`.
+    """
+
+    column: Column | None = None
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         """Apply a numpy function element by element, or reduce with it."""
@@ -89,17 +98,18 @@ class Symbols(np.ndarray[Any, np.dtype[Any]]):
                 "np.maximum and the elementary functions."
             )
         elementwise = np.frompyfunc(operation, ufunc.nin, 1)
-        given = [_plain(value) for value in inputs]
         if method == "__call__":
-            return symbols(elementwise(*given))
+            return _elementwise(operation, elementwise, inputs, range(ufunc.nin))
+        given = [_plain(value) for value in inputs]
         options = {key: value for key, value in options.items() if key in ("axis", "keepdims")}
         if given[0].size == 0 and ufunc in _IDENTITY:
             return symbols(np.full((), _IDENTITY[ufunc], dtype=object))
         whole = method == "reduce" and options.get("axis", 0) is None
         # numpy reduces one axis at a time with functions that it does not know to be commutative.
-        if whole and given[0].ndim > 1:
-            reduced = elementwise.reduce(given[0].ravel())
-            return symbols(reduced.reshape((1,) * given[0].ndim) if options.get("keepdims") else reduced)
+        total = sum_of(inputs[0]) if whole and ufunc is np.add and isinstance(inputs[0], Symbols) else None
+        if whole and (given[0].ndim > 1 or total is not None):
+            reduced = symbols(elementwise.reduce(given[0].ravel()) if total is None else total)
+            return reduced.reshape((1,) * given[0].ndim) if options.get("keepdims") else reduced
         return symbols(getattr(elementwise, method)(given[0], **options))
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
@@ -138,8 +148,21 @@ class Symbols(np.ndarray[Any, np.dtype[Any]]):
 def _where(*args: Any) -> Symbols:
     if len(args) != 3:
         raise TraceError("np.where with a condition only asks for indices: give np.where(condition, a, b).")
-    choose = np.frompyfunc(lambda condition, a, b: ca.if_else(condition, a, b), 3, 1)
-    return symbols(choose(*(_plain(value) for value in args)))
+    # Which of two numbers a traced condition chooses is an expression all the same.
+    return _elementwise(ca.if_else, np.frompyfunc(ca.if_else, 3, 1), args, range(1))
+
+
+def _elementwise(
+    operation: Callable[..., Any], one_by_one: Callable[..., Any], given: Sequence[Any], deciding: Sequence[int]
+) -> Symbols:
+    """Apply an operation to arrays, all elements at once if that can be."""
+    found = at_once(operation, [value if isinstance(value, Symbols) else _plain(value) for value in given], deciding)
+    if found is None:
+        return symbols(one_by_one(*(_plain(value) for value in given)))
+    elements, column = found
+    result = elements.view(Symbols)
+    result.column = column
+    return result
 
 
 def _clip(value: Any, low: Any, high: Any) -> Any:
@@ -195,15 +218,13 @@ def symbols(value: Any) -> Symbols:
 
 def symbol_vector(expression: ca.SX) -> Symbols:
     """Return a CasADi column vector as a one-dimensional array of symbols."""
-    vector = np.empty(expression.shape[0], dtype=object)
-    for k in range(expression.shape[0]):
-        vector[k] = expression[k]
-    return vector.view(Symbols)
+    return np.fromiter(taken_apart(expression), object, expression.shape[0]).view(Symbols)
 
 
 def expressions(value: Any) -> list[ca.SX]:
     """Return the elements of a traced value, row by row, as CasADi expressions."""
-    return [ca.SX(element) for element in np.asarray(_plain(value), dtype=object).ravel()]
+    elements = np.asarray(_plain(value), dtype=object).ravel()
+    return [element if type(element) is ca.SX else ca.SX(element) for element in elements]
 
 
 def _plain(value: Any) -> Any:

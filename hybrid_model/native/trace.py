@@ -18,6 +18,7 @@ from hybrid_model.declare.real_numbers import told
 from hybrid_model.declare.transitions import Assignments, Trigger
 from hybrid_model.declare.variables import Kind, Values, Variable
 from hybrid_model.errors import TraceError
+from hybrid_model.native.symbol_columns import taken_apart
 from hybrid_model.native.symbols import expressions, symbol_vector, symbols
 
 if TYPE_CHECKING:
@@ -118,8 +119,8 @@ def changed(function: ca.Function, kind: Kind) -> frozenset[int]:
     """
     result = (Kind.STATE, Kind.DISCRETE).index(kind)
     arguments = function.sx_in()
-    after, before = function.call(arguments)[result], arguments[1 + result]
-    return frozenset(k for k in range(before.numel()) if not ca.is_equal(after[k], before[k], 0))
+    pairs = zip(taken_apart(function.call(arguments)[result]), taken_apart(arguments[1 + result]), strict=True)
+    return frozenset(k for k, (after, before) in enumerate(pairs) if not ca.is_equal(after, before, 0))
 
 
 def trace(automaton: Automaton) -> Trace:
