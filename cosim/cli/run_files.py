@@ -13,6 +13,7 @@ import numpy as np
 
 from cosim.cli.exits import Exit
 from cosim.cli.progress import Work
+from cosim.masters.error_controlled import RECEIVED
 from cosim.result import CosimResult
 from cosim.system import System
 from cosim.tables.comparison import deviations
@@ -119,8 +120,10 @@ def _write_events(path: Path, result: CosimResult) -> None:
     ticks: dict[tuple[float, str], list[str]] = {}
     for tick in result.ticks:
         ticks.setdefault((tick.t, tick.slave), []).append(tick.clock)
-    places = sorted({(event.t, event.block) for event in result.events} | set(ticks))
+    kinds = {(event.t, event.block): event.kind for event in result.events}
     with replacing(path) as part, part.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["time", "component", "clocks"])
-        writer.writerows([t, slave, " ".join(ticks.get((t, slave), []))] for t, slave in places)
+        writer.writerow(["time", "component", "clocks", "kind"])
+        writer.writerows(
+            [*place, " ".join(ticks.get(place, [])), kinds.get(place, RECEIVED)] for place in sorted({*kinds, *ticks})
+        )

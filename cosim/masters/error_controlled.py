@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
 from cosim.errors import CosimError, MisfitError
 from cosim.feedthrough import refuse_loops
 from cosim.masters.changes import Changes, Given
-from cosim.masters.event_iteration import iterate_events
-from cosim.masters.macro_step import MacroSteps, Outcome, States
+from cosim.masters.event_iteration import Handled, iterate_events
+from cosim.masters.macro_step import SEEN, MacroSteps, Outcome, States
 from cosim.masters.signal_sizes import SignalSizes
 from cosim.masters.start import MOST_STEPS, outputs, require_times, sample_change, sample_end, start_slaves
 from cosim.masters.treatments import with_rollback
@@ -21,7 +20,7 @@ from cosim.result import CosimResult, Watch
 from cosim.system import System, require_system
 from hybrid_model.declare.calls import explained
 from hybrid_model.schedule.blocks import Termination
-from hybrid_model.schedule.scheduler import Event
+from hybrid_model.schedule.scheduler import STOPPED, Event
 
 TOLERANCE = 1e-9
 """Error of a macro step, as a part of the largest value that each signal has had."""
@@ -31,6 +30,8 @@ RESOLUTION = 1e-13
 """Of times of events, as a part of the run."""
 AT_ONE_TIME = 100
 """Instants with events in a row, without a step between them, at most."""
+RECEIVED = "received"
+"""Of an event: what a slave received at that instant brought it about."""
 FIRST = 1e-3
 """First macro step, as a part of the run."""
 SAFETY, LEAST, MOST, ORDER = 0.9, 0.2, 5.0, 3
@@ -153,7 +154,7 @@ class _Run:
         self._h = FIRST * length
         self._sizes, self._widths = SignalSizes((), ()), SignalSizes((), ())
         self._at_one_time = 0
-        self._until, self._quiet = math.inf, _QUIET
+        self._until, self._who, self._quiet = math.inf, "", _QUIET
         self.ended: tuple[str, float, Termination] | None = None
         self.macro: MacroSteps
         result.treatment = {
@@ -164,9 +165,12 @@ class _Run:
         """Handle the events of the start."""
         t, slaves = self._t_start, self._system.slaves
         self.macro = macro = MacroSteps(self._system, self._changes, t, self._t_stop, self._resolution)
+        for name in macro.overlook_restless():
+            self._result.treatment[self._system.output(name)[0].name] += (
+                f"; {name}, which each step changes, tells of none"
+            )
         first = [name for name, slave in slaves.items() if slave.stops_after_events]
-        self.ended = iterate_events(self._system, self._result, t, lambda: first, macro.settle, entered=True)
-        self._go_on(t)
+        self._go_on(t, iterate_events(self._system, self._result, t, lambda: first, macro.settle, entered=True))
         self._sizes = SignalSizes(macro.nominal_outputs, macro.observe())
         self._widths = SignalSizes(macro.nominal_signals, macro.history.last)
 
@@ -179,9 +183,9 @@ class _Run:
             due = self._changes.next_time(limit)
             goal = limit if due is None else max(due, result.t)
             if goal > result.t + (0.0 if due is None else self._resolution):
-                self._step(min(goal, self._until))
+                self._step(min(goal, self._until, *self.macro.announced.values()))
             elif due is not None:
-                self._happen(goal, set())
+                self._happen(goal, {})
         raise CosimError(f"{self._names()} got no further than t = {result.t:.12g} s in {MOST_STEPS} macro steps.")
 
     def _step(self, goal: float) -> None:
@@ -197,9 +201,9 @@ class _Run:
         states, history = macro.save(), macro.history.copy()
         try:
             before = macro.observe()
-            outcome, values = self.macro.attempt(t, end)
+            outcome, values = self._attempt(t, end)
             if h <= 2.0 * self._resolution:
-                outcome.due |= self._jumped(before)
+                outcome.due |= dict.fromkeys(self._jumped(before) - set(outcome.due), SEEN)
                 self._row_before(states, t, end, outcome)
                 # Where nothing was in the way the accuracy was: signals that rise from zero are all surprise there.
                 self._h = MOST * h
@@ -215,8 +219,8 @@ class _Run:
                 outcome, values = self.macro.attempt(t, middle)
                 if outcome.quiet:
                     macro.history.add(middle, values, macro.slopes())
-                    outcome, values = self.macro.attempt(middle, end)
-                    if (outcome.quiet or outcome.believed) and self._is_accurate(whole, end, values, h):
+                    outcome, values = self._attempt(middle, end)
+                    if (outcome.quiet or outcome.believed) and self._is_accurate(whole, end, values, h, outcome.due):
                         self._row_before(states, t, end, outcome)
                         self._arrive(end, values, outcome)
                         return
@@ -228,13 +232,25 @@ class _Run:
         finally:
             macro.release(states)
 
-    def _is_accurate(self, whole: list[float], end: float, values: list[float], h: float) -> bool:
-        """Return whether a step in two halves is accurate, and choose the length of the next one."""
+    def _attempt(self, t: float, t_next: float) -> tuple[Outcome, list[float]]:
+        """Step all slaves, with the event at the end that one without event mode had ended another step after."""
+        outcome, values = self.macro.attempt(t, t_next)
+        if t_next >= self._until and outcome.early is None and not self._system.slaves[self._who].has_event_mode:
+            outcome.due.setdefault(self._who, STOPPED)
+            outcome.exact = True
+        return outcome, values
+
+    def _is_accurate(self, whole: list[float], end: float, values: list[float], h: float, due: Collection[str]) -> bool:
+        """Return whether a step in two halves is accurate, and choose the length of the next one.
+
+        Signals of slaves without event mode that have events at its end have jumped there.
+        """
         halves, signals = np.array(self.macro.observe(), dtype=np.float64), np.array(values, dtype=np.float64)
         # Of second order: the error of the halves is a third of the difference.
         error = np.abs(np.array(whole) - halves) / (3.0 * self._tolerance * self._sizes.beside(halves))
         # A signal that has jumped on the way is far from what was expected, whoever has felt it.
         surprise = np.abs(self.macro.history.at(end) - signals) / self._widths.beside(signals)
+        surprise[[name in due and not self._system.slaves[name].has_event_mode for name in self.macro.senders]] = 0.0
         worst = float(max(np.max(error, initial=0.0), np.max(surprise, initial=0.0) / (SURPRISE * self._tolerance)))
         factor = MOST if worst == 0.0 else SAFETY * worst ** (-1.0 / ORDER)
         if worst > 1.0:
@@ -259,9 +275,11 @@ class _Run:
     def _shorten(self, t: float, h: float, outcome: Outcome) -> None:
         """Choose the next step after one that had something in its way, or was not accurate."""
         if outcome.early is not None and outcome.exact and outcome.early > t:
-            self._until = outcome.early
+            self._until, self._who = outcome.early, outcome.stopped
         elif not outcome.quiet:
             self._h, self._quiet = 0.5 * h, 0
+            if outcome.stopped and not self._system.slaves[outcome.stopped].has_event_mode:
+                self.macro.near[outcome.stopped] = t + h
 
     def _arrive(self, t: float, values: list[float], outcome: Outcome) -> None:
         """Take a step that was made, and handle the events at its end."""
@@ -277,36 +295,38 @@ class _Run:
             self._at_one_time = 0
             self.macro.history.add(t, values, self.macro.slopes())
         else:
-            self._happen(t, outcome.due or set(self._system.slaves))
+            self._happen(t, outcome.due or {outcome.stopped: STOPPED})
             self._h, self._quiet = max(0.1 * self._h, 10.0 * self._resolution), _QUIET
 
-    def _happen(self, t: float, due: set[str]) -> None:
-        """Handle the events at `t` in s."""
+    def _happen(self, t: float, due: dict[str, str]) -> None:
+        """Handle the events at `t` in s, by slave with how they became known."""
         result, system = self._result, self._system
         self._at_one_time += 1
         if self._at_one_time > AT_ONE_TIME:
             raise CosimError(f"{' and '.join(sorted(due))} gets no further than t = {t:.12g} s.")
         result.t = t
         self._row(t)
-        before, shown = len(result.ticks), {name: self._shown(name) for name in due}
-        self.ended = iterate_events(system, result, t, lambda: self._changes.arrive(t), self.macro.settle)
-        # A slave may stop where its event is about to come; there is one where it shows.
-        seen = {tick.slave for tick in result.ticks[before:]}
-        seen |= {n for n in due if not system.slaves[n].has_event_mode or self._shown(n) != shown[n]}
-        result.events += [Event(t, name) for name in system.slaves if name in seen]
-        self._go_on(t)
+        for name in due:
+            self.macro.near.pop(name, None)
+        before = len(result.ticks)
+        handled = iterate_events(system, result, t, lambda: self._changes.arrive(t), self.macro.settle)
+        self._go_on(t, handled)
+        # A slave may stop where its event is about to come, and names times at which there may be none.
+        kinds = {name: kind for name, kind in due.items() if name not in handled.idle and not self._is_to_come(name, t)}
+        kinds = {tick.slave: RECEIVED for tick in result.ticks[before:]} | kinds
+        result.events += [Event(t, name, kinds[name]) for name in system.slaves if name in kinds]
         self._row(t)
 
-    def _go_on(self, t: float) -> None:
+    def _is_to_come(self, name: str, t: float) -> bool:
+        return not self.ended and self.macro.is_to_come(name, t)
+
+    def _go_on(self, t: float, handled: Handled) -> None:
         """Begin anew after the events at `t` in s."""
+        self.ended = handled.ended
         if not self.ended:
+            self.macro.announced = handled.announced
             self.macro.history.forget(t, self.macro.signals(t), self.macro.slopes())
             self.macro.remember()
-
-    def _shown(self, name: str) -> list[Any]:
-        """Return all outputs of a slave."""
-        slave = self._system.slaves[name]
-        return [slave.get(output) for output in slave.outputs]
 
     def _row_before(self, states: States, t: float, end: float, outcome: Outcome) -> None:
         """Keep the row before the jumps that slaves without event mode have made in the step from `t` to `end`, in s.

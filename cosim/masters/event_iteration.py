@@ -3,12 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 
 from cosim.errors import CosimError
 from cosim.result import CosimResult
 from cosim.system import System
 from hybrid_model.schedule.blocks import Termination
 from hybrid_model.schedule.scheduler import ITERATIONS, Tick
+
+
+@dataclass
+class Handled:
+    """What the events of one instant came to.
+
+    Attributes
+    ----------
+    ended : (str, float, Termination) or None
+        The slave that ended the run, when, and why.
+    idle : set of str
+        Slaves that know that they had no event.
+    announced : dict
+        Slave -> the time in s of its next event, of those with event mode that name one.
+    """
+
+    ended: tuple[str, float, Termination] | None = None
+    idle: set[str] = field(default_factory=set)
+    announced: dict[str, float] = field(default_factory=dict)
 
 
 def iterate_events(
@@ -19,7 +39,7 @@ def iterate_events(
     settle: Callable[[str], Termination | None],
     *,
     entered: bool = False,
-) -> tuple[str, float, Termination] | None:
+) -> Handled:
     """Let all slaves with event mode handle their events, signals travelling at once (rule 6).
 
     Parameters
@@ -39,8 +59,7 @@ def iterate_events(
 
     Returns
     -------
-    (str, float, Termination) or None
-        The slave that ended the run, when, and why.
+    Handled
 
     Raises
     ------
@@ -55,7 +74,7 @@ def iterate_events(
     for name in system.slaves:
         if name not in events:
             pending |= _send(system, name, sent)
-    counts = dict.fromkeys(system.slaves, 0)
+    counts, handled = dict.fromkeys(system.slaves, 0), Handled()
     while pending:
         name = next(name for name in system.slaves if name in pending)
         counts[name] += 1
@@ -65,16 +84,23 @@ def iterate_events(
             update = events[name].update()
             result.ticks += [Tick(t, name, clock) for clock in update.ticks]
             again, ended = update.again, update.terminated
+            if update.idle and counts[name] == 1:
+                handled.idle.add(name)
+            if update.next_event is not None:
+                handled.announced[name] = update.next_event
+            else:
+                handled.announced.pop(name, None)
         else:
             again, ended = False, settle(name)
         if ended:
-            return name, t, ended
+            handled.ended = name, t, ended
+            return handled
         if not again:
             pending.discard(name)
         pending |= _send(system, name, sent)
     for slave in events.values():
         slave.enter_step_mode()
-    return None
+    return handled
 
 
 def _send(system: System, name: str, sent: dict[tuple[str, str], object]) -> set[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,10 +14,15 @@ from cosim.masters.signal_history import SignalHistory
 from cosim.slave import Port, Slave
 from cosim.system import System
 from hybrid_model.declare.variables import FloatArray
-from hybrid_model.schedule.blocks import Termination
+from hybrid_model.schedule.blocks import Step, Termination
+from hybrid_model.schedule.scheduler import ANNOUNCED, STOPPED
 
+SEEN = "seen"
+"""Of an event: it is inside a slave, and outputs have changed by it."""
 LEAP = 1e-6
 """Part of a value by which it changes at once if that is a jump."""
+BEYOND = 1e-10
+"""Part of the time by which a step is to be longer than to an event, for an FMU to tell of it."""
 States = list[tuple[Slave, float, Any]]
 """Slaves, where they are in s, and what they gave to return to it."""
 
@@ -30,8 +35,10 @@ class Outcome:
     ----------
     early : float, optional
         Time in s at which a slave returned with an event; the others are elsewhere.
-    due : set of str
-        Slaves with events at the end of the step.
+    stopped : str
+        Which slave that is.
+    due : dict
+        Slaves with events at the end of the step -> how they became known.
     exact : bool
         Whether a slave stopped that has no continuous inputs, so that its event is where it stopped.
     pending : bool
@@ -41,7 +48,8 @@ class Outcome:
     """
 
     early: float | None = None
-    due: set[str] = field(default_factory=set)
+    stopped: str = ""
+    due: dict[str, str] = field(default_factory=dict)
     exact: bool = False
     pending: bool = False
     ended: tuple[str, float, Termination] | None = None
@@ -81,10 +89,14 @@ class MacroSteps:
         Of the continuous connections, and of the outputs of slaves without event mode.
     observe : callable
         Returns all outputs that change along flows: what the accuracy is held against.
-    owners : list of str
-        Whose they are.
+    owners, senders : list of str
+        Whose they are, and whose the signals in `history`.
     nominal_outputs, nominal_signals : list of float
         Nominal values of what `observe` returns, and of what is in `history`; 0 where there is none.
+    announced : dict
+        Slave -> the time in s of its next event, of those with event mode that name one: no step goes beyond it.
+    near : dict
+        Slave that has ended a step after an event that is to be enclosed -> the time in s before which it is.
     meet_at_events : bool
         Whether all slaves say where their events are, and nothing else that they exchange changes: any step will do.
     steps : int
@@ -103,10 +115,13 @@ class MacroSteps:
         inside = [slave for slave in system.slaves.values() if not slave.has_event_mode]
         self._shown = {slave.name: slave.reader(list(slave.outputs)) for slave in inside}
         self._leaping = [(s, self._shown[s.name]) for s in inside if s.name in self._fed]
-        # Where inputs change along flows, a jump within a step is seen by outputs that nobody hears of too.
-        told = dict.fromkeys((c.source, c.output) for c in self._held if not system.slaves[c.source].has_event_mode)
-        told |= dict.fromkeys((s.name, o) for s, _ in self._leaping for o in s.outputs if not _flows(s.outputs[o]))
-        self._inside = [(system.slaves[name], output) for name, output in told]
+        # A jump within a step is seen by outputs that nobody hears of too.
+        self._heard = {(c.source, c.output) for c in self._held}
+        told = {s.name: [o for o in s.outputs if not _flows(s.outputs[o])] for s in inside}
+        self._watched = {name: _Watched(system.slaves[name], outputs) for name, outputs in told.items() if outputs}
+        self._located: dict[str, float] = {}
+        self.announced: dict[str, float] = {}
+        self.near: dict[str, float] = {}
         names = [name for name in system.output_names if _is_flowing_number(system, name)]
         self.observe: Callable[[], list[float]] = system.reader(names)
         self.owners = [system.output(name)[0].name for name in names]
@@ -115,10 +130,10 @@ class MacroSteps:
         self.nominal_outputs = [_port(system, name).nominal for name in names]
         self.nominal_signals = [abs(c.factor) * _port(system, f"{c.source}.{c.output}").nominal for c in self._flows]
         self.nominal_signals += [_port(system, name).nominal for name in alone]
+        self.senders = [c.source for c in self._flows] + [system.output(name)[0].name for name in alone]
         self._slope_places = _slope_places(system, [f"{c.source}.{c.output}" for c in self._flows] + alone)
         self._no_slopes = [math.nan] * (len(self._flows) + len(alone))
         self._leads = any(c.input in system.slaves[c.target].interpolating for c in self._flows)
-        self._known: list[Any] = []
         self._at = dict.fromkeys(system.slaves, t)
         self.meet_at_events = not self._fed and all(
             slave.has_event_mode or slave.stops_after_events for slave in system.slaves.values()
@@ -166,7 +181,29 @@ class MacroSteps:
 
     def remember(self) -> None:
         """Note what the slaves without event mode say at events, to see a change."""
-        self._known = [slave.get(output) for slave, output in self._inside]
+        for watched in self._watched.values():
+            watched.remember()
+
+    def overlook_restless(self) -> list[str]:
+        """Let outputs alone that nobody hears of, and that each step changes, however short it is; return them."""
+        found = []
+        for name, watched in list(self._watched.items()):
+            slave, t, h = self._system.slaves[name], self._at[name], self._resolution
+            unheard = {output for output in watched.outputs if (name, output) not in self._heard}
+            if not unheard or t + 2.0 * h > self._t_stop:
+                continue
+            state, restless = slave.save(), unheard
+            try:
+                for k in (0, 1):
+                    slave.step(t + k * h, t + (k + 1) * h)
+                    restless = restless.intersection(watched.changed())
+                    watched.remember()
+                slave.restore(state)
+            finally:
+                slave.release(state)
+            self._watched[name] = watched.without(restless)
+            found += [f"{name}.{output}" for output in watched.outputs if output in restless]
+        return found
 
     def save(self) -> States:
         """Return the state of all slaves."""
@@ -205,8 +242,7 @@ class MacroSteps:
             self._lead(name, expected, t_next - t)
             if self._at[name] >= t_next:  # by the length of a step that let it settle
                 continue
-            made = slave.step(self._at[name], t_next)
-            self.steps += 1
+            made = self._step(slave, t_next)
             if made.reached < self._at[name] - self._resolution or made.reached > t_next + self._resolution:
                 raise CosimError(
                     f"{name} stepped from {t:.12g} towards {t_next:.12g} s and says that it is at {made.reached:.12g} "
@@ -218,20 +254,80 @@ class MacroSteps:
             # Where a slave is may differ from where all are by rounding.
             self._at[name] = made.reached
             if made.reached < t_next - self._resolution:
-                outcome.early, outcome.exact = made.reached, name not in self._fed
+                outcome.early, outcome.exact, outcome.stopped = made.reached, name not in self._fed, name
                 return outcome, []
             if made.event:
-                outcome.due.add(name)
+                outcome.due[name] = STOPPED
                 outcome.exact = outcome.exact or name not in self._fed
         values = self.signals(t_next)
-        outcome.due |= {slave.name for slave in self._probed if self._probe(slave, t_next)}
+        outcome.due |= {slave.name: STOPPED for slave in self._probed if self._probe(slave, t_next)}
         outcome.pending = any(self._leaps(slave, read, t_next) for slave, read in self._leaping)
-        for (slave, output), known in zip(self._inside, self._known, strict=True):
-            if slave.get(output) != known:
-                outcome.due.add(slave.name)
-                # What ends its steps after events has its event here, or it had ended before.
-                outcome.exact |= slave.stops_after_events and slave.name not in self._fed
+        for name, watched in self._watched.items():
+            if watched.changed():
+                outcome.due[name] = SEEN
+                # What has no continuous inputs has ended its step at its event, or has been searched for it.
+                outcome.exact |= name not in self._fed
+        foreseen = {name: ANNOUNCED for name, time in self.announced.items() if time <= t_next}
+        outcome.due |= foreseen
+        outcome.exact |= bool(foreseen)
         return outcome, values
+
+    def _step(self, slave: Slave, t_next: float) -> Step:
+        """Step a slave to `t_next` in s; one that is searched for its event ends there, as if it had told of it."""
+        name, t = slave.name, self._at[slave.name]
+        self.steps += 1
+        if t < self.near.get(name, -math.inf):
+            return self._step_near(slave, t, t_next)
+        watched = None if slave.stops_after_events or name in self._fed else self._watched.get(name)
+        if watched is None or t_next - t <= 2.0 * self._resolution or self._located.get(name) == t_next:
+            return slave.step(t, t_next)
+        state = slave.save()
+        try:
+            made = slave.step(t, t_next)
+            if made.terminated or not watched.changed():
+                return made
+            found = self._search(slave, state, t, t_next)
+            slave.restore(state)
+            return slave.step(t, t_next) if found > t_next - self._resolution else Step(found, event=True)
+        finally:
+            slave.release(state)
+
+    def _step_near(self, slave: Slave, t: float, t_next: float) -> Step:
+        """Step a slave that ends its steps after events, and say if it has had one at the very end.
+
+        Of that it does not tell. But it would end a longer step there, and does not if it goes on from here.
+        """
+        beyond = t_next + max(2.0 * self._resolution, BEYOND * abs(t_next))
+        if beyond > self._t_stop:
+            return slave.step(t, t_next)
+        longer = self._tried(slave, t, beyond)
+        made = slave.step(t, t_next)
+        had = longer and not made.event and not self._tried(slave, t_next, beyond)
+        return made._replace(event=True) if had else made
+
+    def _search(self, slave: Slave, state: Any, t: float, t_next: float) -> float:
+        """Return when a slave first shows an event inside a step from `state` at `t` to `t_next`, in s.
+
+        It has no continuous inputs, so its steps are its own matter, and it is searched alone.
+        """
+        watched, low, high = self._watched[slave.name], t, t_next
+        slave.restore(state)
+        state = slave.save()
+        try:
+            while high - low > self._resolution and low < (middle := 0.5 * (low + high)) < high:
+                made = slave.step(low, middle)
+                self.steps += 1
+                if made.terminated or watched.changed():
+                    high = middle
+                    slave.restore(state)
+                else:
+                    low = middle
+                    slave.release(state)
+                    state = slave.save()
+        finally:
+            slave.release(state)
+        self._located[slave.name] = high
+        return high
 
     def _lead(self, name: str, expected: list[FloatArray], h: float) -> None:
         """Give a slave its continuous inputs for a step of length `h` in s, by what is expected about its middle.
@@ -271,13 +367,22 @@ class MacroSteps:
         self.steps += 1
         return made.terminated
 
+    def is_to_come(self, name: str, t: float) -> bool:
+        """Return whether a slave still has its event to come after it was in event mode at `t` in s."""
+        slave = self._system.slaves[name]
+        return slave in self._probed and self._probe(slave, t)
+
     def _probe(self, slave: Slave, t: float) -> bool:
         """Return whether a slave has an event with the inputs that it has now."""
-        if t + self._resolution > self._t_stop:
-            return False
+        later = t + self._resolution
+        return later <= self._t_stop and self._tried(slave, self._at[slave.name], later)
+
+    @staticmethod
+    def _tried(slave: Slave, t: float, t_next: float) -> bool:
+        """Return whether a slave tells of an event in a step, which is taken back."""
         state = slave.save()
         try:
-            made = slave.step(self._at[slave.name], t + self._resolution)
+            made = slave.step(t, t_next)
             slave.restore(state)
         finally:
             slave.release(state)
@@ -295,6 +400,29 @@ class MacroSteps:
         finally:
             slave.release(state)
         return _differ(before, after) or made.terminated is not None
+
+
+class _Watched:
+    """Outputs of a slave that handles events inside, which change by these alone."""
+
+    def __init__(self, slave: Slave, outputs: Sequence[str]) -> None:
+        self._slave, self.outputs, self._read = slave, outputs, slave.reader(outputs)
+        self._known = self._read()
+
+    def remember(self) -> None:
+        """Note what they are."""
+        self._known = self._read()
+
+    def changed(self) -> list[str]:
+        """Return those that are others than was noted."""
+        now = self._read()
+        if now == self._known:
+            return []
+        return [output for output, a, b in zip(self.outputs, self._known, now, strict=True) if a != b]
+
+    def without(self, outputs: Collection[str]) -> _Watched:
+        """Return the others."""
+        return _Watched(self._slave, [other for other in self.outputs if other not in outputs])
 
 
 def _differ(before: Sequence[Any], after: Sequence[Any]) -> bool:

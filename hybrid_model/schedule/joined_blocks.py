@@ -19,7 +19,7 @@ from hybrid_model.schedule.blocks import StiffPart, Termination
 from hybrid_model.schedule.native_block import OF_THE_RUN, NativeBlock
 from hybrid_model.schedule.native_network import EVENTS_AT_ONCE, STEPS_AHEAD
 from hybrid_model.schedule.part_table import ROWS, wires_by_source
-from hybrid_model.schedule.scheduler import Event, Tick, Wire
+from hybrid_model.schedule.scheduler import ANNOUNCED, Event, Tick, Wire
 
 
 class JoinedBlocks:
@@ -154,7 +154,7 @@ class JoinedBlocks:
             name = self._names[part]
             self.ticks += [Tick(float(t), name, clock) for number, clock in self._blocks[part].clocks if number == jump]
             if own:
-                self.events.append(Event(float(t), name))
+                self.events.append(Event(float(t), name, ANNOUNCED))
 
     def _note(self, advance: NetworkAdvance) -> None:
         """Note why the run is over, if it is."""

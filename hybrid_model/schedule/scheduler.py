@@ -52,11 +52,18 @@ class Tick(NamedTuple):
     clock: str
 
 
+ANNOUNCED = "announced"
+"""Of an event: it was at the time that its block had named."""
+STOPPED = "stopped"
+"""Of an event: its block ended a step there."""
+
+
 class Event(NamedTuple):
-    """An event of a block, at `t` in s."""
+    """An event of a block, at `t` in s; `kind` is how it became known, such as `ANNOUNCED`."""
 
     t: float
     block: str
+    kind: str
 
 
 class _Link:
@@ -225,8 +232,9 @@ class Scheduler:
             if order not in given:
                 self._in_order[order].block.enter_event_mode()
         self._idle.clear()
+        known = self._known(t, left)
         self._iterate(t, given.union(left))
-        self.events += [Event(t, self._in_order[order].block.name) for order in left if order not in self._idle]
+        self.events += [event for order, event in known.items() if order not in self._idle]
 
     def _iterate(self, t: float, due: set[int]) -> None:
         pending, touched = set(due), set(due)
@@ -264,15 +272,25 @@ class Scheduler:
             self._watch(t)
         if self.ended:
             return
-        happened = [self._in_order[order] for order in sorted(due)]
-        for place in happened:
-            place.block.enter_event_mode()
+        known = self._known(t, sorted(due))
+        for order in known:
+            self._in_order[order].block.enter_event_mode()
         self._idle.clear()
         self._iterate(t, due)
         # Predictions end at the stop time, where there may be no event.
-        self.events += [Event(t, place.block.name) for place in happened if place.order not in self._idle]
+        self.events += [event for order, event in known.items() if order not in self._idle]
         if self._watch:
             self._watch(t)
+
+    def _known(self, t: float, due: Iterable[int]) -> dict[int, Event]:
+        """Return the events of blocks at `t` in s, by what is known of them before they are handled."""
+        events = {}
+        for order in due:
+            place = self._in_order[order]
+            foreseen = math.inf if place.next_event is None else place.next_event
+            kind = ANNOUNCED if abs(foreseen - t) <= self._instant(place, t) else STOPPED
+            events[order] = Event(t, place.block.name, kind)
+        return events
 
     def _bring_all(self, t: float, due: set[int]) -> set[int]:
         """Bring all blocks to an instant; return those that have events there."""

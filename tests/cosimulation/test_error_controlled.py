@@ -124,8 +124,11 @@ def test_events_are_met_that_nobody_else_hears_of(fmi, tmp_path):
     ]
     result = run_error_controlled(System(slaves, {"sink.u": "source.a"}), 5.0, output_interval=1.0, record_events=True)
     expected = (np.pi / 6.0 + 2.0 * np.pi * np.arange(3)) / 3.0
-    np.testing.assert_allclose(result.event_times("sink"), expected, atol=TIME, rtol=0)
-    for count, t in enumerate(result.event_times("sink")):
+    falls = (np.pi - np.arcsin(0.4) + 2.0 * np.pi * np.arange(2)) / 3.0
+    # What an FMU of FMI 2.0 does at the very start of a step, and shows nowhere, it keeps to itself.
+    found = result.event_times("sink")
+    np.testing.assert_allclose(found, sorted([*expected, *(falls if fmi == "3.0" else [])]), atol=TIME, rtol=0)
+    for count, t in enumerate(found[:: 2 if fmi == "3.0" else 1]):
         assert _rows(result, t, "sink.count") == [count, count + 1]
 
 

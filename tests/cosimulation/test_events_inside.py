@@ -79,6 +79,57 @@ def test_the_command_meets_fmi2_at_its_events(exported, tmp_path, capsys):
     assert "b: 9 events at 1.87324039, 3.78459902" in capsys.readouterr().out
 
 
+class Hides(hm.HybridAutomaton):
+    """Counts the halves that its state rises by, and shows it nowhere."""
+
+    u = hm.Input(0.0)
+    x = hm.State(0.0, output=True)
+    n = hm.DiscreteState(0, integer=True)
+
+    def flow_map(self, s):
+        return {"x": s.u}
+
+    def jump_set(self, s):
+        return s.x - 0.5 * (s.n + 1)
+
+    def jump_map(self, s):
+        return {"n": s.n + 1}
+
+
+class Rises(hm.HybridAutomaton):
+    """Time, which is looked at every 0.8 s without consequences."""
+
+    x = hm.State(0.0, output=True)
+    n = hm.DiscreteState(0, integer=True)
+
+    def flow_map(self, s):
+        return {"x": 1.0}
+
+    transitions = (hm.TimeEvent("look", lambda self, s: 0.8 * (s.n + 1), lambda self, s: {"n": s.n + 1}),)
+
+
+@pytest.mark.parametrize("version", ["", "2.0", "3.0"])
+def test_events_that_change_no_output_are_listed(version, exported):
+    """x = t^2/2 is k/2 at sqrt(k)."""
+    kind = (lambda name, a: FmuSlave(name, exported(a, name, version))) if version else AutomatonSlave
+    system = System([kind("rises", Rises()), kind("hides", Hides())], {"hides.u": "rises.x"})
+    result = run_error_controlled(system, 2.1)
+    np.testing.assert_allclose(result.event_times("hides"), np.sqrt([1, 2, 3, 4]), atol=1e-9, rtol=0)
+    np.testing.assert_allclose(result.event_times("rises"), [0.8, 1.6], atol=1e-12, rtol=0)
+    kinds = {(event.block, event.kind) for event in result.events}
+    assert kinds == {("hides", "stopped"), ("rises", "stopped" if version == "2.0" else "announced")}
+
+
+def test_an_output_that_nobody_hears_of_shows_events_of_fmus_without_event_mode(stranger):
+    """It counts at 0.5, 1, 1.5 s, is searched alone, and one of its outputs counts its steps."""
+    slave = FmuSlave("a", stranger(events=False))
+    slave.set("rate", 2.0)
+    result = run_error_controlled(System([slave], {}), 1.6, output_interval=0.4)
+    np.testing.assert_allclose(result.event_times("a"), [0.5, 1.0, 1.5], atol=1e-9, rtol=0)
+    assert [result.signals["a.count"][k] for k, t in enumerate(result.times) if t == result.events[0].t] == [0, 1]
+    assert "a.steps, which each step changes, tells of none" in result.treatment["a"]
+
+
 @pytest.mark.parametrize("events", [True, False])
 def test_what_cannot_save_its_state_is_run_again_up_to_where_it_is_to_return(events, stranger, monkeypatch):
     """A stranger that sends at 0.5, 1, 1.5 s, with event mode or without, to another one that cannot go back either."""

@@ -210,7 +210,9 @@ def test_events_are_logged_and_outputs_drawn(stranger, tmp_path):
     log, picture = tmp_path / "events.csv", tmp_path / "run.png"
     command = ["cosim", str(stranger()), "--start-value", "rate=2", "--event-log", str(log), "--plot", str(picture)]
     assert main(command) == 0
-    assert columns(log) == {"time": ["0.5", "1.0", "1.5", "2.0"], "component": ["stranger"] * 4, "clocks": [""] * 4}
+    logged = columns(log)
+    assert logged.pop("time") == ["0.5", "1.0", "1.5", "2.0"]
+    assert logged == {"component": ["stranger"] * 4, "clocks": [""] * 4, "kind": ["stopped"] * 4}
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -221,7 +223,7 @@ def test_events_before_a_failure_are_logged(stranger, tmp_path, capsys):
     command = ["cosim", str(stranger()), "--event-log", str(log), *(f"--start-value={value}" for value in values)]
     assert main(command) == 1
     assert "outside the step" in capsys.readouterr().err
-    assert columns(log) == {"time": ["0.5"], "component": ["stranger"], "clocks": [""]}
+    assert columns(log) == {"time": ["0.5"], "component": ["stranger"], "clocks": [""], "kind": ["stopped"]}
 
 
 def test_a_table_of_reference_that_does_not_fit_is_wrong_usage(echo, tmp_path, capsys):

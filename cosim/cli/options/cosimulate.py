@@ -159,7 +159,9 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
         help="write all outputs over time, with both rows of a jump; the name says how: .csv, whose rows are there as "
         "soon as they are known, .npz, .mat or .nc",
     )
-    parser.add_argument("--event-log", type=Path, metavar="F.csv", help="write the events: time, component, clocks")
+    parser.add_argument(
+        "--event-log", type=Path, metavar="F.csv", help="write the events: time, component, clocks, kind"
+    )
     parser.add_argument(
         "--reference-file", type=Path, metavar="REF.csv", help="compare with a table; status 1 if they differ"
     )
