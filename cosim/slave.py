@@ -60,6 +60,12 @@ class Measure:
     factor: float = 1.0
     offset: float = 0.0
 
+    def converted_to(self, other: Measure) -> tuple[float, float] | None:
+        """Return factor and offset from this unit to another; None if they measure differently."""
+        if self.exponents != other.exponents or other.factor == 0.0:
+            return None
+        return self.factor / other.factor, (self.offset - other.offset) / other.factor
+
 
 class Slave(Block):
     """A block in a co-simulation.

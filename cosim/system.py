@@ -313,14 +313,14 @@ def _conversion(source: str, output: Port, target: str, input_: Port) -> tuple[f
     if not output.unit or not input_.unit or output.unit == input_.unit:
         return 1.0, 0.0
     given, wanted = output.measure, input_.measure
-    if given is None or wanted is None or given.exponents != wanted.exponents or wanted.factor == 0.0:
-        why = (
-            "both are not declared in SI base units" if given is None or wanted is None else "they measure differently"
-        )
+    known = given is not None and wanted is not None
+    found = given.converted_to(wanted) if given is not None and wanted is not None else None
+    if found is None:
+        why = "they measure differently" if known else "both are not declared in SI base units"
         raise MisfitError(
             f"{source} is in {output.unit!r}, but {target} is in {input_.unit!r}, and {why}: convert one."
         )
-    return given.factor / wanted.factor, (given.offset - wanted.offset) / wanted.factor
+    return found
 
 
 def _require_type(source: str, output: Port, target: str, input_: Port) -> None:

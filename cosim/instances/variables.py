@@ -94,6 +94,19 @@ class FmuVariables:
         tunable = [v for v in self._variables if v.causality == "parameter" and v.variability == "tunable"]
         return [name for variable in tunable for name in self._names(variable)]
 
+    def units(self) -> dict[str, tuple[str, Measure | None, bool]]:
+        """Return the unit of each variable that has one, what it is in SI units, and whether it is a difference."""
+        found = {v.name: (*self._unit(v), _is_relative(v)) for v in self._variables}
+        return {name: told for name, told in found.items() if told[0]}
+
+    def _unit(self, variable: Any) -> tuple[str, Measure | None]:
+        declared = variable.declaredType
+        unit = variable.unit or (declared.unit if declared else None) or ""
+        measure = self._measures.get(unit)
+        if measure is not None and _is_relative(variable):  # a difference: 20 degC are 20 K
+            measure = replace(measure, offset=0.0)
+        return unit, measure
+
     def _count(self) -> None:
         self.places = {
             name: (variable, place) for variable in self._variables for place, name in enumerate(self._names(variable))
@@ -116,16 +129,17 @@ class FmuVariables:
         # FMI has nothing but floating-point numbers that changes along flows.
         discrete = variable.variability == "discrete" or variable.type in DISCRETE
         declared = variable.declaredType
-        unit = variable.unit or (declared.unit if declared else None) or ""
+        unit, measure = self._unit(variable)
         array = variable.name if variable.dimensions else ""
-        measure = self._measures.get(unit)
-        relative = variable.relativeQuantity or (declared is not None and declared.relativeQuantity)
-        if measure is not None and relative:  # a difference: 20 degC are 20 K
-            measure = replace(measure, offset=0.0)
         kind, whole = KINDS.get(variable.type, "number"), variable.type in INTEGERS
         nominal = _nominal(variable.nominal or (declared.nominal if declared else None))
         for name in self._names(variable):
             yield Port(name, unit, discrete, kind, whole, array, measure, nominal)
+
+
+def _is_relative(variable: Any) -> bool:
+    declared = variable.declaredType
+    return bool(variable.relativeQuantity or (declared is not None and declared.relativeQuantity))
 
 
 def _nominal(text: str | None) -> float:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from cosim.errors import MisfitError
+from cosim.slave import Measure
 from cosim.sources import Linear, Source
 from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
+from cosim.systems.ssp_units import REAL, Node, SspUnits, Unit, Wire, measure_of, told
 from fmu.archives.checks import LIMITS
 from fmu.archives.reading import Archive, ArchiveError
 from fmu.importer.plain_xml import PlainXmlError, parse_plain
@@ -16,8 +19,6 @@ from fmu.importer.temporary_folders import temporary_folder
 
 DESCRIPTION = "SystemStructure.ssd"
 VERSIONS = ("1.0", "2.0")
-Node = tuple[str, str]
-"""A connector: of a component, by its path, or of a system, by its path with a point behind."""
 _FMU_TYPES = (None, "application/x-fmu-sharedlibrary")
 _IMPLEMENTATIONS = {None: None, "any": None, "CoSimulation": "cs", "ModelExchange": "me"}
 
@@ -56,9 +57,10 @@ class _Reading:
         self._elements: dict[str, Any] = {}
         self._starts: dict[str, dict[str, Any]] = {}
         self._given: dict[Node, Any] = {}
-        self._units: dict[Node, str] = {}
-        self._into: dict[Node, tuple[Node, float, float]] = {}
-        self._unconverted: set[Node] = set()
+        self._units: dict[Node, Unit] = {}
+        self._as_they_are: set[Node] = set()
+        self._into: dict[Node, tuple[Node, Wire]] = {}
+        self._ssp_units = SspUnits(self._fmu, self._misfit)
 
     def definition(self, path: Path) -> SystemDefinition:
         root = self._parsed(path)
@@ -68,7 +70,7 @@ class _Reading:
         system = next(iter(_children(root, "System")), None)
         if system is None:
             raise self._misfit(f"{DESCRIPTION} has no System")
-        self._read_system(system, "")
+        self._read_system(system, "", self._declared(root))
         connections = self._connections()
         components = [self._component(name, element) for name, element in self._elements.items()]
         if not components:
@@ -83,8 +85,9 @@ class _Reading:
             Experiment(start_time=times.get("startTime"), stop_time=times.get("stopTime")),
         )
 
-    def _read_system(self, system: Any, path: str) -> None:
+    def _read_system(self, system: Any, path: str, units: Mapping[str, Measure]) -> None:
         """Note the components, wires and parameters of a system and of those in it; `path` is its name with a point."""
+        self._read_connectors(system, path, units)
         self._given |= {(path, name): value for name, value in self._parameters(system, path).items()}
         paths = {None: path}
         for element in next(iter(_children(system, "Elements")), ()):
@@ -95,8 +98,9 @@ class _Reading:
             if name in self._elements:
                 raise self._misfit(f"two of its components are called {name}")
             if kind == "System":
-                self._read_system(element, f"{name}.")
+                self._read_system(element, f"{name}.", units)
             elif kind == "Component":
+                self._read_connectors(element, name, units)
                 self._elements[name], self._starts[name] = element, self._parameters(element, name)
             elif kind not in ("Annotations", ""):
                 raise self._misfit(f"it has a {kind} {name!r}, and components and systems alone are supported")
@@ -106,12 +110,28 @@ class _Reading:
                     raise self._misfit(f"a connection names {name!r}, which is no component")
             source = paths[wire.get("startElement")], wire.get("startConnector")
             target = paths[wire.get("endElement")], wire.get("endConnector")
-            told = f"its connection {_told(source)} -> {_told(target)}"
-            if _suppressed(wire):
-                self._unconverted.add(target)
+            scale = self._scale(wire, f"its connection {told(source)} -> {told(target)}")
             if target in self._into:
-                raise self._misfit(f"{_told(target)} is connected twice")
-            self._into[target] = source, *self._scale(wire, told)
+                raise self._misfit(f"{told(target)} is connected twice")
+            self._into[target] = source, Wire(target, *scale, converted=not _suppressed(wire))
+
+    def _read_connectors(self, element: Any, place: str, units: Mapping[str, Measure]) -> None:
+        for connector in _children_of(next(iter(_children(element, "Connectors")), ()), "Connector"):
+            for typed in connector:
+                if _local(typed) in REAL and typed.get("unit"):
+                    unit = Unit(typed.get("unit"), units.get(typed.get("unit")))
+                    self._ssp_units.say((place, connector.get("name")), unit)
+
+    def _declared(self, root: Any) -> dict[str, Measure]:
+        """Return what the units of a file are in SI units."""
+        found = {}
+        for unit in _children_of(next(iter(_children(root, "Units")), ()), "Unit"):
+            for base in _children(unit, "BaseUnit"):
+                try:
+                    found[unit.get("name", "")] = measure_of(base.attrib)
+                except ValueError as error:
+                    raise self._misfit(f"its unit {unit.get('name')!r} is no unit: {error}") from error
+        return found
 
     def _connections(self) -> dict[str, Source]:
         """Follow the wires from each input through the borders of systems to an output, or to a parameter."""
@@ -119,21 +139,28 @@ class _Reading:
         for target in self._into:
             if target[0] not in self._elements:
                 continue
-            at, factor, offset, converted = target, 1.0, 0.0, True
+            at, wires = target, list[Wire]()
             for _ in self._into:
                 if at not in self._into:
                     break
-                converted = converted and at not in self._unconverted
-                at, by, plus = self._into[at]
-                factor, offset = factor * by, factor * plus + offset
+                at, wire = self._into[at]
+                wires.insert(0, wire)
             if at[0] in self._elements:
-                plain = converted and (factor, offset) == (1.0, 0.0)
-                connections[_told(target)] = _told(at) if plain else Linear(_told(at), factor, offset, converted)
-            elif at in self._given:
-                if target[1] not in self._starts[target[0]] and at in self._units and converted:
-                    self._units[target] = self._units[at]
-                self._starts[target[0]].setdefault(target[1], self._scaled(self._given[at], factor, offset, at))
+                connections[told(target)] = self._wired(at, wires)
+            elif at in self._given and target[1] not in self._starts[target[0]]:
+                line = self._ssp_units.along(at, wires, self._units.get(at))
+                self._starts[target[0]][target[1]] = self._scaled(self._given[at], *line, at)
+                self._as_they_are.add(target)
         return connections
+
+    def _wired(self, start: Node, wires: list[Wire]) -> Source:
+        """Return what drives an input: units are the matter of the slaves where no connector has one of its own."""
+        converted, line = all(wire.converted for wire in wires), (1.0, 0.0)
+        for wire in wires:
+            line = wire.factor * line[0], wire.factor * line[1] + wire.offset
+        if self._ssp_units.are_said([start, *(wire.target for wire in wires)]):
+            converted, line = False, self._ssp_units.along(start, wires)
+        return told(start) if converted and line == (1.0, 0.0) else Linear(told(start), *line, converted)
 
     def _scale(self, element: Any, told: str) -> tuple[float, float]:
         """Return factor and offset of an element with or without a transformation."""
@@ -149,64 +176,57 @@ class _Reading:
         return factor, offset
 
     def _component(self, name: str, element: Any) -> Component:
-        source, kind = element.get("source"), element.get("type")
+        kind = element.get("type")
         if kind not in _FMU_TYPES:
             raise self._misfit(f"its component {name} is of type {kind!r}, and FMUs alone are supported")
         implementation = element.get("implementation")
         if implementation not in _IMPLEMENTATIONS:
             raise self._misfit(f"its component {name} is for {implementation}, which no master runs")
-        file, start = self._file(source, f"component {name}"), self._starts[name]
-        self._require_units(name, file)
-        return Component(name, FMU, str(file), start, {}, _IMPLEMENTATIONS[implementation])
+        start = {variable: self._converted((name, variable), value) for variable, value in self._starts[name].items()}
+        return Component(name, FMU, str(self._fmu(name)), start, {}, _IMPLEMENTATIONS[implementation])
 
-    def _require_units(self, name: str, file: Path) -> None:
-        """Refuse parameters in other units than the FMU has them in, which are not converted."""
-        told = {variable: unit for (place, variable), unit in self._units.items() if place == name}
-        if not told:
-            return
-        # fmpy is imported by whoever reads a system, not by whoever asks for the versions there are.
-        from fmu.importer.loading import read_description
+    def _fmu(self, name: str) -> Path:
+        return self._file(self._elements[name].get("source"), f"component {name}")
 
-        try:
-            description = read_description(str(file), validate=False)
-        except Exception:  # noqa: BLE001 - whatever fmpy raises, the slave says what is wrong
-            return
-        own = {v.name: v.unit or (v.declaredType.unit if v.declaredType else None) for v in description.modelVariables}
-        for variable, unit in told.items():
-            wanted = own.get(variable, own.get(variable.partition("[")[0]))
-            if wanted and wanted != unit:
-                told_in = f"its parameter {name}.{variable} is in {unit!r}, but the FMU has it in {wanted!r}"
-                raise self._misfit(f"{told_in}, and parameters are not converted: give it in that unit")
+    def _converted(self, node: Node, value: Any) -> Any:
+        """Return a start value in the unit of the FMU."""
+        if node in self._as_they_are or not (node in self._units or self._ssp_units.are_said([node])):
+            return value
+        wire = Wire(node)
+        return self._scaled(value, *self._ssp_units.along(("", ""), [wire], self._units.get(node)), node)
 
     def _parameters(self, element: Any, place: str) -> dict[str, Any]:
         values: dict[str, Any] = {}
         for binding in _children_of(next(iter(_children(element, "ParameterBindings")), ()), "ParameterBinding"):
             prefix = binding.get("prefix", "")
             if binding.get("source") is not None:
-                found = self._set(self._parsed(self._file(binding.get("source"), "parameters")))
+                sets = [self._parsed(self._file(binding.get("source"), "parameters"))]
             else:
-                inline = [s for v in _children(binding, "ParameterValues") for s in _children(v, "ParameterSet")]
-                found = {name: value for one in inline for name, value in self._set(one).items()}
+                sets = [s for v in _children(binding, "ParameterValues") for s in _children(v, "ParameterSet")]
+            found = {name: value for one in sets for name, value in self._set(one, self._declared(one)).items()}
             mapping = self._mapping(binding)
             for name, (value, unit) in found.items():
                 same = prefix + name, 1.0, 0.0, True
                 target, factor, offset, converted = mapping.get(prefix + name, same)
                 values[target] = self._scaled(value, factor, offset, (place, target))
-                if unit is not None and converted:
+                if not converted:
+                    self._as_they_are.add((place, target))
+                elif unit is not None:
                     self._units[place, target] = unit
         return values
 
-    def _set(self, root: Any) -> dict[str, tuple[str | list[str], str | None]]:
-        """Return the values of a set of parameters and their units, as they are written."""
-        values: dict[str, tuple[str | list[str], str | None]] = {}
+    def _set(self, root: Any, units: Mapping[str, Measure]) -> dict[str, tuple[str | list[str], Unit | None]]:
+        """Return the values of a set of parameters as they are written, and their units."""
+        values: dict[str, tuple[str | list[str], Unit | None]] = {}
         for parameter in _children_of(next(iter(_children(root, "Parameters")), ()), "Parameter"):
             is_array, name = bool(_children(parameter, "Dimension")), parameter.get("name", "")
             for typed in parameter:
-                listed = [element.get("value") for element in _children(typed, "Value")]
+                listed, unit = [element.get("value") for element in _children(typed, "Value")], typed.get("unit")
+                known = Unit(unit, units.get(unit)) if unit else None
                 if listed:
-                    values[name] = listed if is_array else listed[0], typed.get("unit")
+                    values[name] = listed if is_array else listed[0], known
                 elif typed.get("value") is not None:
-                    values[name] = typed.get("value").split() if is_array else typed.get("value"), typed.get("unit")
+                    values[name] = typed.get("value").split() if is_array else typed.get("value"), known
         return values
 
     def _mapping(self, binding: Any) -> dict[str, tuple[str, float, float, bool]]:
@@ -248,14 +268,10 @@ class _Reading:
             return value
         if isinstance(value, list):
             return [self._scaled(one, factor, offset, node) for one in value]
-        return factor * self._number(value, _told(node)) + offset
+        return factor * self._number(value, told(node)) + offset
 
     def _misfit(self, why: str) -> MisfitError:
         return MisfitError(f"{self._told} cannot be run: {why}.")
-
-
-def _told(node: Node) -> str:
-    return f"{node[0]}.{node[1]}" if node[0] and not node[0].endswith(".") else f"{node[0]}{node[1]}"
 
 
 def _suppressed(element: Any) -> bool:

@@ -1,5 +1,6 @@
 """Systems in SSP files: read and written, both versions; the folder for libcosim; what must not be read."""
 
+import shutil
 import zipfile
 from importlib import resources
 
@@ -256,7 +257,7 @@ def test_parameters_in_another_unit_than_the_fmus_are_refused(fmi, tmp_path, exp
             for name, old in members.items():
                 archive.writestr(name, content if name == "SystemStructure.ssd" else old)
         if unit == "cm":
-            with pytest.raises(MisfitError, match=r"rod\.length is in 'cm', but the FMU has it in 'm'"):
+            with pytest.raises(MisfitError, match=r"rod\.length is given in 'cm', but the FMU has it in 'm'"):
                 read_ssp(path)
     assert read_ssp(path).components[0].start == {"length": "250.0"}
 
@@ -287,6 +288,49 @@ def test_units_are_converted_unless_a_connection_suppresses_it(suppressed, tmp_p
     again = read_ssp(path)
     assert again.connections == {"b.u": source}
     assert run_fixed_step(assemble(again), 1.0, 0.5).final["b.y"] == (2.0 if suppressed else 2000.0)
+
+
+CONNECTORS = """<ssd:SystemStructureDescription version="2.0" name="units"
+    xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"
+    xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">
+  <ssd:System name="top"><ssd:Elements>
+    <ssd:Component name="a" source="metres.fmu"><ssd:Connectors>
+      <ssd:Connector name="y" kind="output"><ssc:Real unit="{out}"/></ssd:Connector>
+      <ssd:Connector name="height" kind="parameter"><ssc:Real unit="cm"/></ssd:Connector></ssd:Connectors>
+      <ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="2.0" name="p">
+        <ssv:Parameters><ssv:Parameter name="height"><ssv:Real value="250"/></ssv:Parameter></ssv:Parameters>
+      </ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>
+    </ssd:Component>
+    <ssd:Component name="b" source="millimetres.fmu"><ssd:Connectors>
+      <ssd:Connector name="u" kind="input"><ssc:Float64 unit="m"/></ssd:Connector></ssd:Connectors></ssd:Component>
+  </ssd:Elements><ssd:Connections>
+    <ssd:Connection startElement="a" startConnector="y" endElement="b" endConnector="u" {suppressed}>{more}
+    </ssd:Connection></ssd:Connections></ssd:System>
+  <ssd:Units>
+    <ssc:Unit name="cm"><ssc:BaseUnit m="1" factor="0.01"/></ssc:Unit>
+    <ssc:Unit name="m"><ssc:BaseUnit m="1"/></ssc:Unit>
+    <ssc:Unit name="kg"><ssc:BaseUnit kg="1"/></ssc:Unit></ssd:Units>
+</ssd:SystemStructureDescription>"""
+TRIPLE = '<ssc:LinearTransformation factor="3" offset="1"/>'
+SUPPRESSED = 'suppressUnitConversion="true"'
+
+
+@pytest.mark.parametrize(
+    ("suppressed", "more", "expected"),
+    [("", "", 2500.0), ("", TRIPLE, 8500.0), (SUPPRESSED, "", 250e3), (SUPPRESSED, TRIPLE, 751e3)],
+)
+def test_units_of_connectors_are_those_of_what_goes_over_them(suppressed, more, expected, tmp_path, exported):
+    """250 cm in a parameter are 2.5 m in the FMU and 250 cm at its connector, 2.5 m at the other, and mm behind it."""
+    shutil.copy(exported(Metres(), "metres"), tmp_path / "metres.fmu")
+    shutil.copy(exported(Millimetres(), "millimetres"), tmp_path / "millimetres.fmu")
+    path = tmp_path / "SystemStructure.ssd"
+    path.write_text(CONNECTORS.format(out="cm", suppressed=suppressed, more=more))
+    assert run_fixed_step(assemble(read_system(path.parent)), 1.0, 0.5).final["b.y"] == pytest.approx(expected)
+    for unit, why in (("kg", "they measure differently"), ("yd", "both are not declared in SI base units")):
+        path.write_text(CONNECTORS.format(out=unit, suppressed=suppressed, more=more))
+        with pytest.raises(MisfitError, match=rf"a\.y is given in 'm', but its connector is in '{unit}', and {why}"):
+            read_system(path.parent)
 
 
 def test_units_of_parameters_are_not_looked_at_where_a_mapping_suppresses_it(by_hand, tmp_path):
