@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
+
+from hybrid_model.native.rolled_loops import rolled
 
 _OPTIONS: dict[str, Any] = {
     "with_header": False,
@@ -20,10 +23,18 @@ _OPTIONS: dict[str, Any] = {
 }
 
 _SCALARS = ("double", "bool", "size_t", "uint32_t", "uint64_t", "ModelFunction")
+_BODY = re.compile(r"(static int casadi_f\d+\([^)]*\) \{\n)(.*?)(  return 0;\n\}\n)", re.DOTALL)
 
 
-def functions(name: str, given: Iterable[ca.Function]) -> str:
-    """Return definitions of traced functions.
+class Definitions(NamedTuple):
+    """Definitions of functions in C, and the sizes of the work arrays arg, res, iw and w that they need."""
+
+    text: str
+    work: tuple[int, int, int, int]
+
+
+def functions(name: str, given: Iterable[ca.Function]) -> Definitions:
+    """Return definitions of traced functions; what repeats itself often in them is in loops.
 
     Parameters
     ----------
@@ -32,11 +43,26 @@ def functions(name: str, given: Iterable[ca.Function]) -> str:
     given : iterable of casadi.Function
         With names of their own.
     """
-    generator = ca.CodeGenerator(name, _OPTIONS)
+    generator, given = ca.CodeGenerator(name, _OPTIONS), list(given)
     for function in given:
         generator.add(function)
+    doubles = [function.sz_w() for function in given]
+
+    def with_loops(found: re.Match[str]) -> str:
+        body = rolled(found[2])
+        if body is None:
+            return found[0]
+        doubles.append(body.work)
+        return f"{found[1]}{body.text}{found[3]}"
+
+    text = _BODY.sub(with_loops, generator.dump())
+    arguments, results, integers = (
+        max((int(getattr(function, size)()) for function in given), default=0) for size in ("sz_arg", "sz_res", "sz_iw")
+    )
     # A dozen functions that describe it come with each map; unused ones that nobody else may call are not compiled.
-    return f"#define CASADI_SYMBOL_EXPORT static\n{generator.dump()}"
+    return Definitions(
+        f"#define CASADI_SYMBOL_EXPORT static\n{text}", (arguments, results, integers, max(doubles, default=0))
+    )
 
 
 def string(text: str) -> str:

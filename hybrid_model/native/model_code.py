@@ -78,11 +78,12 @@ def _maps(
         found["factors"] = held.function
     resets = [_Reset(reset) for reset in traced.resets]
     given = [*traced.functions[: -len(resets) or None], *(reset.function for reset in resets), *found.values()]
-    work = [max(getattr(f, size)() for f in given) for size in ("sz_arg", "sz_res", "sz_iw", "sz_w")]
+    maps = functions("model", given)
+    work = list(maps.work)
     without = [f"#define hybrid_{name} NULL" for name in _DERIVATIVES if name not in found]
     code = "\n".join(
         [
-            functions("model", given),
+            maps.text,
             '#include "model.h"',
             "",
             *_resets(traced, resets, work[-1]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable, Sequence
 
 import casadi as ca
@@ -10,7 +11,7 @@ import numpy as np
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import FloatArray, Kind
-from hybrid_model.native.c_text import array, boolean, constant, functions, row
+from hybrid_model.native.c_text import Definitions, array, boolean, constant, functions, row
 from hybrid_model.native.networks.evaluation_order import Call, Order, Piece
 from hybrid_model.native.networks.groups import Group, forward, reverse, sliced
 from hybrid_model.native.networks.members import Members, NotLoopable
@@ -49,7 +50,6 @@ class NetworkCode:
     @property
     def work_sizes(self) -> tuple[int, int, int, int]:
         """Sizes that the functions need of arg, res, iw and w, see hybrid_model/engine/networks/network.h."""
-        functions = self._functions.values()
         sizes = self._members.layout.sizes
         most = {kind: self._most(kind) for kind in Kind}
         own = (
@@ -64,17 +64,18 @@ class NetworkCode:
             + 2 * most[Kind.INPUT]
             + most[Kind.PARAMETER]
         )
-        return (
-            _ARG + max((function.sz_arg() for function in functions), default=0),
-            _RES + max((function.sz_res() for function in functions), default=0),
-            max((function.sz_iw() for function in functions), default=0),
-            own + max((function.sz_w() for function in functions), default=0),
-        )
+        arguments, results, integers, doubles = self._maps.work
+        return _ARG + arguments, _RES + results, integers, own + doubles
 
     def text(self) -> str:
         """Return C99 that defines ``hybrid_start``, ``hybrid_flow``, ..., ``hybrid_reset`` for the engine."""
-        maps = functions("network", self._functions.values())
-        return "\n".join([maps, "#include <math.h>", '#include "network.h"', "", *self._tables(), _wrappers()])
+        return "\n".join(
+            [self._maps.text, "#include <math.h>", '#include "network.h"', "", *self._tables(), _wrappers()]
+        )
+
+    @functools.cached_property
+    def _maps(self) -> Definitions:
+        return functions("network", self._functions.values())
 
     # Functions
 
