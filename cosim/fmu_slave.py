@@ -114,6 +114,7 @@ class FmuSlave(Slave):
             self._variables.resize(variable, held)
             self.inputs = {port.name: port for port in self._variables.ports("input")}
             self.outputs = {port.name: port for port in self._variables.ports("output")}
+            self._tell_of_sizes()
 
     def parse(self, name: str, text: str) -> Value:
         """See `Slave.parse`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -117,6 +118,16 @@ class Slave(Block):
         self.outputs: Mapping[str, Port] = {port.name: port for port in outputs}
         self.clocks = tuple(clocks)
         self.tunable = tuple(tunable)
+        self._told_of_sizes: list[weakref.ReferenceType[Callable[[], None]]] = []
+
+    def tell_of_sizes(self, told: weakref.ReferenceType[Callable[[], None]]) -> None:
+        """Have something called, for as long as it is there, when arrays among the inputs and outputs are resized."""
+        self._told_of_sizes = [*(other for other in self._told_of_sizes if other() is not None), told]
+
+    def _tell_of_sizes(self) -> None:
+        for reference in self._told_of_sizes:
+            if (told := reference()) is not None:
+                told()
 
     @abstractmethod
     def start(self, t_start: float, t_stop: float, *, events: bool, early: bool = False) -> None:

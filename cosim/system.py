@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -86,22 +87,53 @@ class System:
         self.slaves = {slave.name: slave for slave in slaves}
         if len(self.slaves) < len(slaves):
             raise MisfitError(f"two slaves have one name among {[slave.name for slave in slaves]}: name them apart.")
-        self._outputs = {f"{slave.name}.{port}": (slave, port) for slave in slaves for port in slave.outputs}
-        self.connections = tuple(
+        self._given = dict(connections)
+        self._wire()
+        for slave in slaves:
+            slave.tell_of_sizes(weakref.WeakMethod(self._resized))
+
+    def _wire(self) -> None:
+        """Find the outputs, and take the connections apart to those of scalars."""
+        self._wired = True
+        self._all = {f"{slave.name}.{port}": (slave, port) for slave in self.slaves.values() for port in slave.outputs}
+        self._wires = tuple(
             self._connection(target, source, given)
-            for vector, given in connections.items()
+            for vector, given in self._given.items()
             for target, source in self._elements(vector, given.source if isinstance(given, Linear) else given)
         )
         self._refuse_doubles()
         self._from: dict[str, list[Connection]] = {name: [] for name in self.slaves}
-        for connection in self.connections:
+        for connection in self._wires:
             self._from[connection.source].append(connection)
+
+    def _resized(self) -> None:
+        """Wire anew when that is asked for next: a structural parameter has changed the sizes of a slave's arrays."""
+        self._wired = False
+
+    @property
+    def connections(self) -> tuple[Connection, ...]:
+        """All connections, of scalars.
+
+        Raises
+        ------
+        MisfitError
+            If what is connected does not fit any more, for structural parameters have been set since.
+        """
+        if not self._wired:
+            self._wire()
+        return self._wires
+
+    @property
+    def _outputs(self) -> dict[str, tuple[Slave, str]]:
+        if not self._wired:
+            self._wire()
+        return self._all
 
     def with_slaves(self, others: Mapping[str, Slave]) -> System:
         """Return the system with others in the place of slaves, by name, that have the same variables."""
         made = copy.copy(self)
         made.slaves = {name: others.get(name, slave) for name, slave in self.slaves.items()}
-        made._outputs = {name: (made.slaves[slave.name], port) for name, (slave, port) in self._outputs.items()}
+        made._all = {name: (made.slaves[slave.name], port) for name, (slave, port) in self._outputs.items()}
         return made
 
     @property
@@ -117,6 +149,8 @@ class System:
 
     def from_slave(self, name: str) -> list[Connection]:
         """Return the connections that start at a slave."""
+        if not self._wired:
+            self._wire()
         return self._from[name]
 
     def is_continuous(self, connection: Connection) -> bool:
@@ -248,7 +282,7 @@ class System:
 
     def _refuse_doubles(self) -> None:
         driven: dict[tuple[str, str], Connection] = {}
-        for connection in self.connections:
+        for connection in self._wires:
             first = driven.setdefault((connection.target, connection.input), connection)
             if first is not connection:
                 raise MisfitError(f"{first} and {connection} drive one input: leave one of them out.")

@@ -83,6 +83,7 @@ class IsolatedSlave(Slave):
         if not self._started:
             self._given.append((name, value))
             self._learn(self._call("facts"))
+            self._tell_of_sizes()
 
     def get(self, name: str) -> Any:
         """See `Slave.get`."""

@@ -200,21 +200,22 @@ fmi3Status fmi3GetFloat64(fmi3Instance i, const fmi3ValueReference r[], size_t n
     double sum = 0.0;
     for (uint64_t k = 0; k < b->size; k++)
         sum += b->weights[k];
-    for (size_t j = 0; j < n; j++) {
+    for (size_t j = 0; j < n; j++, v++, m--) {
         if (r[j] == WEIGHTS) {
-            if (m != b->size)
+            if (m < b->size || (n == 1 && m > b->size))
                 return refuse(b, "weights have %g elements", (double)b->size);
-            memcpy(v, b->weights, m * sizeof *v);
+            memcpy(v, b->weights, b->size * sizeof *v);
+            v += b->size - 1, m -= b->size - 1;
         } else if (r[j] == 0)
-            v[j] = b->next;
+            *v = b->next;
         else if (r[j] == X)
-            v[j] = (b->next - b->last) * b->rate;
+            *v = (b->next - b->last) * b->rate;
         else if (r[j] == TOTAL)
-            v[j] = sum;
+            *v = sum;
         else if (r[j] == GAINED)
-            v[j] = b->gain * b->heard;
+            *v = b->gain * b->heard;
         else if (real(b, r[j]))
-            v[j] = *real(b, r[j]);
+            *v = *real(b, r[j]);
         else
             return refuse(b, "no Float64 %g", r[j]);
     }

@@ -12,6 +12,7 @@ from cosim.cli.main import main
 from cosim.errors import CosimError, MisfitError
 from cosim.flow_functions import FlowError, FlowFunctions
 from cosim.fmu_slave import FmuSlave
+from cosim.isolation.isolated_slave import IsolatedSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.system import System
 
@@ -154,19 +155,28 @@ def test_whole_numbers_are_shown_and_written_with_all_their_digits(stranger, tmp
     )
 
 
-@pytest.mark.parametrize("size", [1, 4])
-def test_outputs_have_the_sizes_that_the_command_gives_them(size, stranger, tmp_path):
-    path, out = stranger(), tmp_path / "out.csv"
+@pytest.fixture
+def weights_out(stranger):
+    """Make the weights of the stranger outputs."""
+    path = stranger()
     with zipfile.ZipFile(path) as archive:
         members = {name: archive.read(name) for name in archive.namelist()}
     weights = b'name="weights" valueReference="8" causality='
     text = members["modelDescription.xml"]
-    changed = text.replace(weights + b'"parameter" variability="fixed" start="1 1"', weights + b'"output"')
+    changed = text.replace(
+        weights + b'"parameter" variability="fixed" start="1 1"', weights + b'"output" variability="discrete"'
+    )
     assert changed != text
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in (members | {"modelDescription.xml": changed}).items():
             archive.writestr(name, content)
-    assert main(["cosim", str(path), "--start-value", f"size={size}", "--output-file", str(out)]) == 0
+    return path
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_outputs_have_the_sizes_that_the_command_gives_them(size, weights_out, tmp_path):
+    out = tmp_path / "out.csv"
+    assert main(["cosim", str(weights_out), "--start-value", f"size={size}", "--output-file", str(out)]) == 0
     with out.open(newline="") as file:
         assert {row["weights"] for row in csv.DictReader(file)} == {" ".join(["1.0"] * size)}
 
@@ -178,6 +188,27 @@ def test_structural_parameters_are_set_in_configuration_mode(stranger, capsys):
     assert "stranger.total = 5.5" in capsys.readouterr().out
     assert main(["cosim", str(stranger()), "--start-value", "weights[4]=2.5"]) == 2
     assert "stranger has no variable 'weights[4]'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("size", [1, 4])
+def test_a_system_follows_the_sizes_that_its_slaves_are_given_later(size, weights_out):
+    slave = FmuSlave("a", weights_out)
+    system = System([slave], {"a.float64_in": "a.weights[1]"})
+    slave.set("size", size)
+    names = [f"a.weights[{k + 1}]" for k in range(size)]
+    assert [name for name in system.output_names if name.startswith("a.weights")] == names
+    result = run_fixed_step(system, 0.2, 0.1, record=system.output_names)
+    assert [result.final[name] for name in (*names, "a.float64_out")] == [1.0] * (size + 1)
+
+
+def test_what_is_connected_to_elements_that_are_gone_is_refused_by_name(weights_out):
+    slave = IsolatedSlave("a", weights_out)
+    system = System([slave], {"a.float64_in": "a.weights[2]"})
+    slave.set("size", 1)
+    with pytest.raises(MisfitError, match=r"a\.weights\[2\] is not an output"):
+        run_fixed_step(system, 0.1, 0.1)
+    slave.set("size", 2)
+    assert run_fixed_step(system, 0.2, 0.1).final["a.float64_out"] == 1.0
 
 
 def test_structural_parameters_are_not_for_a_run(stranger):
