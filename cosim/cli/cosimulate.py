@@ -52,6 +52,9 @@ FEWEST, MOST = 10, 100_000
 def run(options: argparse.Namespace) -> int:
     """Run the command."""
     starts = given_values(options.start_value)
+    # libcosim, which folders are for, has no FMI 3.0.
+    to_folder = options.save_as is not None and options.save_as.suffix.lower() != ".ssp"
+    options.fmi = options.fmi or ("2.0" if to_folder else "3.0")
     folder = temporary_folder()
     try:
         definition = _described(options)
@@ -104,7 +107,7 @@ def _slips_of(options: argparse.Namespace) -> Iterator[None]:
         yield
     except MisfitError as error:
         written = Path(options.system)
-        if written.is_dir() or written.suffix.lower() == ".toml":
+        if written.is_dir() or written.suffix.lower() in (".toml", ".ssp"):
             raise UsageError(str(error)) from error
         raise
 

@@ -369,6 +369,22 @@ def test_a_description_of_an_fmu_with_a_doctype_is_refused(stranger, tmp_path, c
     assert "modelDescription.xml has a DOCTYPE" in capsys.readouterr().err
 
 
+def test_what_is_wrong_in_an_ssp_is_wrong_usage_as_in_toml(by_hand, tmp_path, capsys):
+    broken = tmp_path / "broken.ssp"
+    broken.write_text("no archive")
+    for path, sentence in ((broken, "not a readable ZIP archive"), (by_hand(source=False), "which is no file in it")):
+        assert main(["cosim", str(path)]) == 2
+        assert sentence in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("given", "version"), [([], "2.0"), (["--fmi", "3.0"], "3.0")])
+def test_folders_for_libcosim_have_fmus_that_it_reads(given, version, tmp_path):
+    file = tmp_path / "system.toml"
+    file.write_text(f'[experiment]\nstop_time = 1.0\n[components.a]\nautomaton = "{__file__}:Gain"\n')
+    assert main(["cosim", str(file), "--save-as", str(tmp_path / "out"), *given]) == 0
+    assert fmpy.read_model_description(str(tmp_path / "out" / "a.fmu")).fmiVersion == version
+
+
 def test_a_folder_for_libcosim_names_everything(stranger, tmp_path):
     stranger()
     (tmp_path / "system.toml").write_text(SYSTEM)

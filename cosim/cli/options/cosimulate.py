@@ -48,8 +48,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--fmi",
         choices=("2.0", "3.0"),
-        default="3.0",
-        help="version of the FMUs that are made of a scenario, and of automata for --save-as (default: %(default)s)",
+        help="version of the FMUs that are made of a scenario, and of automata for --save-as (default: 3.0; in a "
+        "folder for libcosim 2.0)",
     )
     parser.add_argument(
         "--tolerance", type=positive, metavar="TOL", help="of the error-controlled master: of each step (default: 1e-9)"
@@ -99,7 +99,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--save-as",
         type=Path,
         metavar="F.ssp|DIR",
-        help="do not run: write the system as an SSP, or as a folder for libcosim (OspSystemStructure.xml)",
+        help="do not run: write the system as an SSP (fmpy's runner takes FMI 2.0 alone: --fmi 2.0; Ecos and this "
+        "command take both), or as a folder for libcosim (OspSystemStructure.xml)",
     )
     parser.add_argument(
         "--step-study",
