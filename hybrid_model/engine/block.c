@@ -181,12 +181,6 @@ void *engine_wrapper(Engine *engine)
     return engine->wrapper;
 }
 
-void engine_copy(double *to, const double *from, size_t n)
-{
-    if (n > 0)
-        memcpy(to, from, n * sizeof(double));
-}
-
 void engine_copy_point(const Engine *engine, const Point *from, const Point *to)
 {
     engine_copy(to->time, from->time, point_length(engine->model));

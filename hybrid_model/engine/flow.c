@@ -109,6 +109,9 @@ FlowEnd engine_flow(Engine *engine, const Point *point, double limit, bool locat
             return FLOW_REACHED;
         double piece_end = fmin(engine_next_time(engine, point, locate, true), engine->options.barrier); /* line 11 */
         FlowEnd result = flow_piece(engine, point, limit, piece_end, locate, budget);
+        /* What happens at the breakpoint is for whoever goes on from there. */
+        if (result == FLOW_REACHED && *budget == 0 && *point->time < limit)
+            return FLOW_BUDGET;
         bool near = piece_end <= limit && piece_end - *point->time <= engine_one_instant(engine, piece_end);
         if (result == FLOW_EVENT && near && *point->time < piece_end) /* line 15 */
             result = go_on_to(engine, point, piece_end);

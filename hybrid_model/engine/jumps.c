@@ -200,7 +200,7 @@ bool engine_first_enabled(Engine *engine, const Point *point, size_t *jump)
     const Model *m = engine->model;
     bool open = !m->flow_priority, asked = open;
     *jump = m->n_jumps;
-    if (!engine_evaluate_times(engine, point) || !engine_evaluate_margins(engine, *point->time, point->x, point->z))
+    if (!engine_evaluate_margins(engine, *point->time, point->x, point->z))
         return false;
     for (size_t j = 0; j < m->n_jumps; j++) {
         const ModelJump *entry = &m->jumps[j];
@@ -255,7 +255,8 @@ size_t engine_pending(Engine *engine)
 {
     size_t jump;
     engine_catch_up(engine);
-    if (engine->status->ending != ENDED_NOT || !engine_first_enabled(engine, &engine->live, &jump))
+    if (engine->status->ending != ENDED_NOT || !engine_evaluate_times(engine, &engine->live) ||
+        !engine_first_enabled(engine, &engine->live, &jump))
         return engine->model->n_jumps;
     return jump;
 }

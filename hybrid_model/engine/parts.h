@@ -210,6 +210,47 @@ struct Engine {
    made again, of the length that the point has now. */
 typedef enum { FLOW_REACHED, FLOW_EVENT, FLOW_SHORTER, FLOW_CHANGED, FLOW_BUDGET, FLOW_PROBLEM } FlowEnd;
 
+/* What is called so often that calls would cost more. */
+
+/* The larger and the smaller of two numbers; the second one where the first is not a number. */
+static inline double engine_larger(double a, double b)
+{
+    return a > b ? a : b;
+}
+
+static inline double engine_smaller(double a, double b)
+{
+    return a < b ? a : b;
+}
+
+static inline void engine_copy(double *to, const double *from, size_t n)
+{
+    if (n > 0)
+        memcpy(to, from, n * sizeof(double));
+}
+
+/* Hands a function of the model its arguments and places for its results. */
+static inline void engine_bind(Engine *engine, const double *t, const double *x, const double *z, double *first,
+                               double *second)
+{
+    /* The function may use the places behind its own for the functions that it calls. */
+    engine->arg[0] = t;
+    engine->arg[1] = x;
+    engine->arg[2] = z;
+    engine->arg[3] = engine->u;
+    engine->arg[4] = engine->p;
+    engine->res[0] = first;
+    engine->res[1] = second;
+}
+
+/* Evaluates a function of the model at (t, x, z) with the present inputs and parameters. */
+static inline bool engine_evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z,
+                                   double *first, double *second)
+{
+    engine_bind(engine, &t, x, z, first, second);
+    return function(engine->arg, engine->res, engine->iw, engine->w, 0) == 0;
+}
+
 /* The files of the engine from the lowest to the highest: each calls functions of those before it only.  Those of
    engine.h are in message.c, segment.c, block.c, recorder.c, values.c, jumps.c, create.c, views.c, sensitivity.c (after
    differences.c), predict.c, outside.c and engine.c, the last ones; samples.c, rises.c and crossings.c, before
@@ -244,7 +285,6 @@ void engine_note_factors(const Engine *engine, Bank bank, size_t index);
 /* block.c */
 /* Whether the flow may turn out to be stiff in a run. */
 bool engine_may_show_stiffness(const Model *model);
-void engine_copy(double *to, const double *from, size_t n);
 void engine_copy_point(const Engine *engine, const Point *from, const Point *to);
 /* The number of seeds in one of the engine's two places for them. */
 size_t engine_seed_count(const Model *model);
@@ -252,11 +292,6 @@ size_t engine_seed_count(const Model *model);
 bool engine_take_memory(Engine *engine);
 
 /* values.c */
-/* Hands a function of the model its arguments and places for its results. */
-void engine_bind(Engine *engine, const double *t, const double *x, const double *z, double *first, double *second);
-/* Evaluates a function of the model at (t, x, z) with the present inputs and parameters. */
-bool engine_evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
-              double *second);
 /* The rates of the states there; nothing to do without states. */
 bool engine_rates(Engine *engine, double t, const double *x, const double *z, double *result);
 /* The usual size of state i at a point whose value there is x. */
@@ -364,9 +399,9 @@ bool engine_apply_start(Engine *engine, const Point *point);
 /* Takes a jump that is due at the point, for which the event times must be there; those afterwards are there then. */
 bool engine_apply_reset(Engine *engine, size_t jump, const Point *point);
 bool engine_evaluate_times(Engine *engine, const Point *point);
-/* Takes the breakpoints of the flow that are due and come before any visible jump. */
+/* Takes the breakpoints of the flow that are due and come before any visible jump; the times are there then. */
 bool engine_take_internal_jumps(Engine *engine, const Point *point);
-/* The first enabled visible jump at the point, n_jumps if there is none. */
+/* The first enabled visible jump at the point, whose times must be there; n_jumps if there is none. */
 bool engine_first_enabled(Engine *engine, const Point *point, size_t *jump);
 
 /* views.c */

@@ -136,7 +136,8 @@ void engine_flow_past_event(Engine *engine, double target)
     size_t before, after, budget = (size_t)engine->options.look_ahead_steps;
     engine_copy_point(engine, &engine->live, &engine->shown);
     engine->view = VIEW_NONE;
-    if (engine_first_enabled(engine, &engine->live, &before) && !breakpoint_until(engine, target) &&
+    if (engine_evaluate_times(engine, &engine->live) && engine_first_enabled(engine, &engine->live, &before) &&
+        !breakpoint_until(engine, target) &&
         engine_flow(engine, &engine->shown, target, false, &budget) == FLOW_REACHED &&
         engine_first_enabled(engine, &engine->shown, &after) && before == after)
         engine_copy_point(engine, &engine->shown, &engine->live);

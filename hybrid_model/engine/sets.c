@@ -12,7 +12,7 @@ double engine_one_instant(const Engine *engine, double t)
         return engine->options.event_tolerance;
     double by_run = scales->instant * (t - status->start_time);
     double by_gap = scales->instant_in_gap * (t - status->jumps_time);
-    return fmax(scales->roundings * engine_time_ulp(t), fmin(by_run, by_gap));
+    return engine_larger(engine_smaller(by_run, by_gap), scales->roundings * engine_time_ulp(t));
 }
 
 bool engine_evaluate_margins(Engine *engine, double t, const double *x, const double *z)

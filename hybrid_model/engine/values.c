@@ -7,14 +7,14 @@
 double engine_state_size(const Engine *engine, const Point *point, size_t i, double x)
 {
     double nominal = engine->model->nominals[i];
-    return nominal > 0.0 ? nominal : fmax(point->size[i], fabs(x));
+    return nominal > 0.0 ? nominal : engine_larger(fabs(x), point->size[i]);
 }
 
 double engine_largest_state(const Engine *engine, const Point *point, const double *x)
 {
-    double largest = fmax(DBL_MIN / engine->model->scales.absolute, engine->status->floor);
+    double largest = engine_larger(DBL_MIN / engine->model->scales.absolute, engine->status->floor);
     for (size_t i = 0; i < engine->model->n_states; i++)
-        largest = fmax(largest, engine_state_size(engine, point, i, x[i]));
+        largest = engine_larger(engine_state_size(engine, point, i, x[i]), largest);
     return largest;
 }
 
@@ -30,13 +30,13 @@ static double wanted_scale(const Engine *engine, const Point *point, size_t i, d
 {
     const EngineOptions *options = &engine->options;
     const ModelScales *scales = &engine->model->scales;
-    double relative = fmax(options->relative_tolerance, engine->method->finest_tolerance);
+    double relative = engine_larger(options->relative_tolerance, engine->method->finest_tolerance);
     double nominal = engine->model->nominals[i], looser = relative / RELATIVE_TOLERANCE;
     if (options->absolute_tolerance > 0.0)
         return options->absolute_tolerance + relative * size;
-    double shown = fmax(engine->status->floor, fmax(point->size[i], size)) / engine->largest;
+    double shown = engine_larger(engine_larger(size, point->size[i]), engine->status->floor) / engine->largest;
     double usual = engine->largest * (shown < scales->rounding_level ? 1.0 : sqrt(shown));
-    double part = scales->absolute * looser * (nominal > 0.0 ? nominal : fmin(usual, 1.0));
+    double part = scales->absolute * looser * (nominal > 0.0 ? nominal : engine_smaller(usual, 1.0));
     return part + relative * size;
 }
 
@@ -67,25 +67,6 @@ void engine_clear_levels(const Engine *engine, const Point *point)
 {
     for (size_t i = 0; i <= engine->model->n_margins; i++)
         point->level[i] = 0.0;
-}
-
-void engine_bind(Engine *engine, const double *t, const double *x, const double *z, double *first, double *second)
-{
-    /* The function may use the places behind its own for the functions that it calls. */
-    engine->arg[0] = t;
-    engine->arg[1] = x;
-    engine->arg[2] = z;
-    engine->arg[3] = engine->u;
-    engine->arg[4] = engine->p;
-    engine->res[0] = first;
-    engine->res[1] = second;
-}
-
-bool engine_evaluate(Engine *engine, ModelFunction function, double t, const double *x, const double *z, double *first,
-                     double *second)
-{
-    engine_bind(engine, &t, x, z, first, second);
-    return function(engine->arg, engine->res, engine->iw, engine->w, 0) == 0;
 }
 
 bool engine_rates(Engine *engine, double t, const double *x, const double *z, double *result)

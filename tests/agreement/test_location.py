@@ -217,7 +217,7 @@ def test_the_tables_of_the_runtime_are_those_of_python():
 
     contribution = table("CONTRIBUTION", len(POINTS) + 2)
     # Python inverts matrices, of condition 200 at most, in floating point.
-    np.testing.assert_allclose(table("POINTS", 1)[:, 0], POINTS, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(table("engine_points", 1)[:, 0], POINTS, rtol=0, atol=1e-15)
     np.testing.assert_allclose(contribution[:, :-2].T, TO_BERNSTEIN, rtol=0, atol=1e-12)
     np.testing.assert_allclose(contribution[:, -2:].T, TO_TAIL, rtol=0, atol=1e-15)
     assert int(re.search(r"SPLITS (\d+)", own_files("search.h")[0].read_text())[1]) == HALVINGS

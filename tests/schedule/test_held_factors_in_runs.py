@@ -80,6 +80,54 @@ def test_events_are_where_the_closed_form_has_them(w):
     assert run.arcs["walker"].at("x", end) == pytest.approx(walked(w, heard, mark, x, t, end), abs=1e-12)
 
 
+class Gated(hm.HybridAutomaton):
+    """x' = side cos(w t) cos(tilt) (u - mark): what is in front of u changes with breakpoints and receptions."""
+
+    x = hm.State(0.0, output=True)
+    u = hm.Input(0.0, discrete=True)
+    tilt = hm.Input(0.0, discrete=True)
+    w = hm.Parameter(2.0)
+    far = hm.Parameter(0.05)
+    mark = hm.DiscreteState(0.0, output=True)
+    side = hm.DiscreteState(1.0)
+    turns = hm.DiscreteState(1.0)
+
+    def flow_map(self, s):
+        return {"x": s.side * np.cos(s.w * s.t) * np.cos(s.tilt) * (s.u - s.mark)}
+
+    transitions = Walker.transitions
+
+
+def test_functions_change_with_what_they_depend_on():
+    """Three walkers share series as long as what these depend on is the same; x is that of the closed form."""
+    end, names = 9.0, ("a", "b", "c")
+    parts = {"speaker": Speaker(), "tilter": Speaker(first=0.25, period=0.81), **{name: Gated() for name in names}}
+    wires = {**{f"{name}.u": "speaker.said" for name in names}, "b.tilt": "tilter.said", "c.tilt": "tilter.said"}
+    run = hm.simulate_network(hm.Composition("gates", parts, wires), end, engine="native")
+    said, since, x, mark = {"speaker": 0.8, "tilter": 0.8}, dict.fromkeys(names, 0.0), dict.fromkeys(names, 0.0), {}
+
+    def go_on(name, t):
+        tilt = 0.0 if name == "a" else said["tilter"]
+        edges = np.concatenate([[since[name]], [s for s in 1.5 * np.arange(1, 7) if since[name] < s < t], [t]])
+        sides = (-1.0) ** np.floor(0.5 * (edges[1:] + edges[:-1]) / 1.5)
+        turned = float(np.sum(sides * np.diff(np.sin(2.0 * edges)))) / 2.0
+        x[name] += np.cos(tilt) * (said["speaker"] - mark.get(name, 0.0)) * turned
+        since[name] = t
+
+    for part, jump in run.jumps:
+        for name in names:
+            go_on(name, jump.t)
+        if jump.name == "say":
+            said[part] = np.cos(2.0 * jump.z_before[0] + (0.1 if part == "speaker" else 0.25))
+        elif jump.name == "mark":
+            assert abs(abs(x[part] - mark.get(part, 0.0)) - 0.05) < 1e-12, jump.t
+            mark[part] = x[part]
+    assert len(mark) == 3
+    for name in names:
+        go_on(name, end)
+        assert run.arcs[name].at("x", end) == pytest.approx(x[name], abs=1e-12)
+
+
 class Pulsed(hm.HybridAutomaton):
     """Goes in one pulse, and hardly so before and after; marks x wherever it has gone far enough."""
 

@@ -19,11 +19,11 @@ void engine_refine_bracket(Search *search, Path path, double wide, size_t row, B
     double a = bracket->a, fa = bracket->value_a, b = bracket->b, fb = bracket->value_b, fraction = fa / (fa - fb);
     for (int i = 0; i < 200 && fb != 0.0 && !search->failed; i++) {
         /* Zero may lie between: the floats at the nearer end do not decide alone. */
-        double width = fmax(2.0 * fmax(engine_time_ulp(a), engine_time_ulp(b)), wide);
+        double width = engine_larger(2.0 * engine_larger(engine_time_ulp(a), engine_time_ulp(b)), wide);
         if (b - a <= width)
             break;
         double least = 0.5 * width / (b - a);
-        double t = a + fmin(fmax(fraction, least), 1.0 - least) * (b - a);
+        double t = a + engine_smaller(engine_larger(fraction, least), 1.0 - least) * (b - a);
         if (!(t > a && t < b))
             break;
         double f = engine_look_at(search, path, t, row);

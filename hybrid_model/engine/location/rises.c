@@ -10,8 +10,7 @@
 #include "method.h"
 #include "search.h"
 
-/* Chebyshev-Lobatto points on [0, 1]. */
-static const double POINTS[N_SAMPLES] = {
+const double engine_points[N_SAMPLES] = {
     0.0, 0.038060233744356624, 0.14644660940672624, 0.30865828381745514, 0.5,
     0.6913417161825449, 0.8535533905932737, 0.9619397662556434, 1.0};
 
@@ -67,11 +66,6 @@ typedef struct {
     size_t low, high;
 } Verdict;
 
-double engine_sample_time(double a, double b, size_t i)
-{
-    return i + 1 == N_SAMPLES ? b : a + (b - a) * POINTS[i];
-}
-
 static Verdict between_samples(bool settled, const double *samples)
 {
     for (size_t i = 0; i + 1 < N_SAMPLES; i++)
@@ -113,7 +107,8 @@ static Shape parabola(const double *samples)
     double a = samples[0], b = samples[DEGREE], middle = 2.0 * samples[DEGREE / 2] - 0.5 * (a + b), bend = 0.0;
     double first = middle - a, second = b - middle;
     for (size_t i = 1; i < DEGREE; i++) {
-        double deviation = fabs(samples[i] - (a + POINTS[i] * (2.0 * first + POINTS[i] * (second - first))));
+        double along = engine_points[i], of_parabola = a + along * (2.0 * first + along * (second - first));
+        double deviation = fabs(samples[i] - of_parabola);
         bend = deviation > bend ? deviation : bend;
     }
     double least = a < b ? a : b, most = a > b ? a : b, slope = BEND_IN_SLOPE * bend, curve = BEND_IN_CURVE * bend;
@@ -137,6 +132,9 @@ static Shape polynomial(const double *samples)
         shape.below = shape.below && bounds[i] + tail < 0.0;
         shape.above = shape.above && bounds[i] - tail >= 0.0;
     }
+    /* That decides by itself. */
+    if (shape.below || shape.above)
+        return shape;
     /* The derivative of the polynomial is off by up to the degree squared times the tail, its coefficients are the
        differences times the degree; and so on. */
     for (size_t i = 0; i < DEGREE; i++) {
@@ -176,7 +174,7 @@ static double split_point(const double *samples)
     double slopes[DEGREE], most = 0.0, at = 0.5;
     size_t gap = 0;
     for (size_t i = 0; i < DEGREE; i++)
-        slopes[i] = (samples[i + 1] - samples[i]) / (POINTS[i + 1] - POINTS[i]);
+        slopes[i] = (samples[i + 1] - samples[i]) / (engine_points[i + 1] - engine_points[i]);
     for (size_t i = 2; i + 2 < DEGREE; i++) {
         double turn = fabs(slopes[i + 1] - slopes[i - 1]);
         gap = turn > most ? i : gap;
@@ -184,7 +182,7 @@ static double split_point(const double *samples)
     }
     if (gap == 0)
         return at;
-    const double *x = POINTS + gap;
+    const double *x = engine_points + gap;
     double left_bend = (slopes[gap - 1] - slopes[gap - 2]) / (x[0] - x[-2]);
     double right_bend = (slopes[gap + 2] - slopes[gap + 1]) / (x[3] - x[1]);
     double left = slopes[gap - 1] + (x[0] - x[-1]) * left_bend, right = slopes[gap + 1] - (x[2] - x[1]) * right_bend;

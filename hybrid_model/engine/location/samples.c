@@ -5,17 +5,21 @@
 #include "method.h"
 #include "search.h"
 
-/* Where a state is no number, that is the flow map's fault and not a margin's. */
-static bool states_are_finite(Engine *engine, double t, const double *x)
+static bool not_finite(Engine *engine, double t, size_t i)
 {
     const Model *m = engine->model;
-    for (size_t i = 0; i < m->n_states; i++)
+    return engine_fail(engine, ENDED_NOT_FINITE,
+                       "'%s' does not stay finite up to t = %.17g. Remedy: check its derivative for 0/0 or the root "
+                       "of a negative number; trial steps look a little outside the flow set.",
+                       NAME_AT(m->names, m->state_names[i]), t);
+}
+
+/* Where a state is no number, that is the flow map's fault and not a margin's. */
+static inline bool states_are_finite(Engine *engine, double t, const double *x)
+{
+    for (size_t i = 0; i < engine->model->n_states; i++)
         if (!isfinite(x[i]))
-            return engine_fail(
-                engine, ENDED_NOT_FINITE,
-                "'%s' does not stay finite up to t = %.17g. Remedy: check its derivative for 0/0 or the root "
-                "of a negative number; trial steps look a little outside the flow set.",
-                NAME_AT(m->names, m->state_names[i]), t);
+            return not_finite(engine, t, i);
     return true;
 }
 
@@ -68,12 +72,15 @@ static void states_at_samples(Engine *engine, const double *times, double *state
 {
     const Step *step = &engine->step;
     size_t n = engine->model->n_states;
-    double parts[N_SAMPLES];
+    const double *vectors = engine_step_vectors(engine);
+    double parts[N_SAMPLES], span = step->end - step->begin;
     for (size_t i = 0; i < N_SAMPLES; i++)
-        parts[i] = (times[i] - step->begin) / (step->end - step->begin);
-    engine->method->interpolate_samples(engine_step_vectors(engine), step->n_terms, n, parts, states);
+        parts[i] = (times[i] - step->begin) / span;
+    engine->method->interpolate_samples(vectors, step->n_terms, n, parts + 1, states + n);
     if (times[0] == step->t0)
         engine_copy(states, step->x0, n);
+    else
+        engine->method->interpolate(vectors, step->n_terms, n, parts[0], states);
     if (times[N_SAMPLES - 1] == step->t1)
         engine_copy(states + (N_SAMPLES - 1) * n, step->x1, n);
 }
@@ -132,9 +139,4 @@ double engine_look_at(Search *search, Path path, double t, size_t row)
         return engine->margins[row];
     search->failed = true;
     return 0.0;
-}
-
-double engine_sample(const Search *search, size_t i, size_t row)
-{
-    return search->engine->samples[i * search->n_rows + row];
 }

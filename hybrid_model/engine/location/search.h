@@ -56,11 +56,19 @@ bool engine_look_at_samples(Search *search, const double *times, double *rows);
 /* The value of one row. */
 double engine_look_at(Search *search, Path path, double t, size_t row);
 /* The value of one row in a sample of the window. */
-double engine_sample(const Search *search, size_t i, size_t row);
+static inline double engine_sample(const Search *search, size_t i, size_t row)
+{
+    return search->engine->samples[i * search->n_rows + row];
+}
 
 /* rises.c */
+/* Chebyshev-Lobatto points on [0, 1]. */
+extern const double engine_points[N_SAMPLES];
 /* The time of a sample of the piece from a to b. */
-double engine_sample_time(double a, double b, size_t i);
+static inline double engine_sample_time(double a, double b, size_t i)
+{
+    return i + 1 == N_SAMPLES ? b : a + (b - a) * engine_points[i];
+}
 /* Begins at the start of the window, whose samples must be there. */
 void engine_begin_rises(Rises *rises, Search *search, size_t row, double threshold);
 /* Begins at the start of the step, and ends with the window. */

@@ -161,41 +161,40 @@ void engine_series_at(const double *series, size_t n_terms, size_t n, double a, 
 }
 
 /* Samples side by side, an even number of them, since processors take two at a time. */
-#define SIDE_BY_SIDE ((N_SAMPLES + 1) / 2 * 2)
-typedef struct {
-    double at[SIDE_BY_SIDE];
-} Samples;
+#define SIDE_BY_SIDE (N_SAMPLES - 1)
 
-static void series_of_state(const double *of, size_t n_terms, size_t n, const Samples *s, Samples *values)
+static void series_side_by_side(const double *of, size_t n_terms, size_t n, const double *parts, double *x)
 {
-    Samples twice, even1 = {{0.0}}, even2 = {{0.0}}, odd1 = {{0.0}}, odd2 = {{0.0}};
-    for (size_t i = 0; i < SIDE_BY_SIDE; i++)
-        twice.at[i] = 2.0 * (2.0 * s->at[i] * s->at[i] - 1.0);
+    double s[SIDE_BY_SIDE], twice[SIDE_BY_SIDE];
+    double even1[SIDE_BY_SIDE] = {0.0}, even2[SIDE_BY_SIDE] = {0.0};
+    double odd1[SIDE_BY_SIDE] = {0.0}, odd2[SIDE_BY_SIDE] = {0.0};
+    for (size_t i = 0; i < SIDE_BY_SIDE; i++) {
+        s[i] = 2.0 * parts[i] - 1.0;
+        twice[i] = 2.0 * (2.0 * s[i] * s[i] - 1.0);
+    }
     for (size_t k = (n_terms + 1) / 2; k-- > 1;) {
         double even_term = of[2 * k * n], odd_term = of[(2 * k + 1) * n];
         for (size_t i = 0; i < SIDE_BY_SIDE; i++) {
-            double even = twice.at[i] * even1.at[i] + (even_term - even2.at[i]);
-            double odd = twice.at[i] * odd1.at[i] + (odd_term - odd2.at[i]);
-            even2.at[i] = even1.at[i];
-            odd2.at[i] = odd1.at[i];
-            even1.at[i] = even;
-            odd1.at[i] = odd;
+            double even = twice[i] * even1[i] + (even_term - even2[i]);
+            double odd = twice[i] * odd1[i] + (odd_term - odd2[i]);
+            even2[i] = even1[i];
+            odd2[i] = odd1[i];
+            even1[i] = even;
+            odd1[i] = odd;
         }
     }
     for (size_t i = 0; i < SIDE_BY_SIDE; i++)
-        values->at[i] = of[0] + 0.5 * twice.at[i] * even1.at[i] - even2.at[i] +
-                        s->at[i] * (of[n] + (twice.at[i] - 1.0) * odd1.at[i] - odd2.at[i]);
+        x[i * n] = of[0] + 0.5 * twice[i] * even1[i] - even2[i] +
+                   s[i] * (of[n] + (twice[i] - 1.0) * odd1[i] - odd2[i]);
 }
 
 void engine_series_at_samples(const double *series, size_t n_terms, size_t n, const double *parts, double *x)
 {
-    Samples s = {{0.0}}, values;
-    for (size_t i = 0; i < N_SAMPLES; i++)
-        s.at[i] = 2.0 * parts[i] - 1.0;
     for (size_t state = 0; state < n; state++) {
-        series_of_state(series + state, n_terms, n, &s, &values);
-        for (size_t i = 0; i < N_SAMPLES; i++)
-            x[i * n + state] = values.at[i];
+        if (n_terms > 1)
+            series_side_by_side(series + state, n_terms, n, parts, x + state);
+        for (size_t i = 0; n_terms == 1 && i < SIDE_BY_SIDE; i++)
+            x[i * n + state] = series[state];
     }
 }
 

@@ -36,7 +36,8 @@ void engine_series_at_nodes(const double *series, size_t n_terms, size_t n, size
 void engine_series_at_end(const double *series, size_t n_terms, size_t n, const double *x0, double *x);
 /* The value of a series at the part a of the step. */
 void engine_series_at(const double *series, size_t n_terms, size_t n, double a, double *x);
-/* The values of a series at N_SAMPLES parts of the step, one vector after the other: each as by engine_series_at. */
+/* The values of a series at N_SAMPLES - 1 parts of the step, one vector after the other: each as by
+   engine_series_at. */
 void engine_series_at_samples(const double *series, size_t n_terms, size_t n, const double *parts, double *x);
 /* The straight way from x0 to x1 as a series. */
 void engine_straight_series(const double *x0, const double *x1, size_t n, double *series);

@@ -185,24 +185,31 @@ static const double *row_of(Engine *engine, const Point *point)
     return NULL;
 }
 
+/* Functions that others share are not written to. */
+static void add_series(double *restrict sum, double share, const double *restrict series)
+{
+    for (size_t k = 0; k < N_SERIES; k++)
+        sum[k] += share * series[k];
+}
+
 /* Sums the series of a row with the present values into those of the states, and their tails; without constants. */
 static void sum_series(Engine *engine, const Point *point, const double *row, double *tails)
 {
     const Model *m = engine->model;
     const double *series = row + PIECE_KEYS + m->n_factor_keys, *of_series = series + N_SERIES * series_count(m);
-    double *sums = engine->factors.sums, *vectors = engine->step.vectors;
+    double *vectors = engine->step.vectors;
     size_t n = m->n_states;
+    /* One state's series lies as the vectors do. */
+    double *sums = n == 1 ? vectors : engine->factors.sums;
     engine_copy(sums, series, N_SERIES * n);
     engine_copy(tails, of_series, n);
     series += N_SERIES * n;
     for (size_t e = 0; e < m->n_factors; e++, series += N_SERIES) {
         double share = value_at(engine, point, m->held[m->factor_columns[e]]);
-        double *sum = sums + N_SERIES * m->factor_rows[e];
-        for (size_t k = 0; k < N_SERIES; k++)
-            sum[k] += share * series[k];
+        add_series(sums + N_SERIES * m->factor_rows[e], share, series);
         tails[m->factor_rows[e]] += fabs(share) * of_series[n + e];
     }
-    for (size_t i = 0; i < n; i++)
+    for (size_t i = 0; n > 1 && i < n; i++)
         for (size_t k = 0; k < N_SERIES; k++)
             vectors[k * n + i] = sums[N_SERIES * i + k];
 }

@@ -37,7 +37,7 @@ struct Method {
     void (*prepare)(Engine *engine);
     /* Evaluates vectors, of which those behind n_terms are zero, at the part a of a step, from 0 to 1. */
     void (*interpolate)(const double *vectors, size_t n_terms, size_t n_states, double a, double *x);
-    /* The same for N_SAMPLES parts at once, whose states are put one after the other.  NULL where that spares
+    /* The same for N_SAMPLES - 1 parts at once, whose states are put one after the other.  NULL where that spares
        nothing. */
     void (*interpolate_samples)(const double *vectors, size_t n_terms, size_t n_states, const double *parts, double *x);
     /* The vectors of the straight way from x0 to x1. */

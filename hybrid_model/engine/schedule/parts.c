@@ -33,13 +33,11 @@ void schedule_let_go(Schedule *schedule)
         let_go(schedule, &schedule->groups[k]);
 }
 
-Engine *schedule_at(Schedule *schedule, uint32_t i)
+Engine *schedule_turn_to(Schedule *schedule, uint32_t i)
 {
     Part *part = &schedule->parts[i];
     Group *group = &schedule->groups[part->group];
     Engine *engine = group->engine;
-    if (group->present == i)
-        return engine;
     let_go(schedule, group);
     engine_use_block(engine, schedule_block(schedule, i));
     engine->statistics.jumps = part->jumps;
@@ -96,7 +94,7 @@ double schedule_instant(const Schedule *schedule, uint32_t i, double t)
         return engine->options.event_tolerance;
     double by_run = scales->instant * (t - schedule->start);
     double by_gap = scales->instant_in_gap * (t - part->t_event);
-    return fmax(scales->roundings * engine_time_ulp(t), fmin(by_run, by_gap));
+    return engine_larger(engine_smaller(by_run, by_gap), scales->roundings * engine_time_ulp(t));
 }
 
 /* Whether the flow of a part has turned out to be stiff, and its model has no derivatives for that: the run is over. */

@@ -129,8 +129,14 @@ bool log_event(EventLog *log, double t, uint32_t part, uint32_t jump, const doub
 void log_free(EventLog *log);
 
 /* parts.c: one part */
-/* The engine of a part's group, on the block of that part. */
-Engine *schedule_at(Schedule *schedule, uint32_t i);
+/* Puts the engine of a part's group on the block of that part. */
+Engine *schedule_turn_to(Schedule *schedule, uint32_t i);
+/* That engine, which is there already more often than not. */
+static inline Engine *schedule_at(Schedule *schedule, uint32_t i)
+{
+    const Group *group = &schedule->groups[schedule->parts[i].group];
+    return group->present == i ? group->engine : schedule_turn_to(schedule, i);
+}
 /* The same at t, on a copy where the part has to be brought there: whoever looks changes nothing. */
 Engine *schedule_peek(Schedule *schedule, uint32_t i, double t);
 /* The engines are on no part's block. */
