@@ -235,7 +235,7 @@ class _Run:
     def _attempt(self, t: float, t_next: float) -> tuple[Outcome, list[float]]:
         """Step all slaves, with the event at the end that one without event mode had ended another step after."""
         outcome, values = self.macro.attempt(t, t_next)
-        if t_next >= self._until and outcome.early is None and not self._system.slaves[self._who].has_event_mode:
+        if t_next >= self._until and outcome.early is None and self._system.slaves[self._who].stops_after_events:
             outcome.due.setdefault(self._who, STOPPED)
             outcome.exact = True
         return outcome, values
@@ -274,11 +274,14 @@ class _Run:
 
     def _shorten(self, t: float, h: float, outcome: Outcome) -> None:
         """Choose the next step after one that had something in its way, or was not accurate."""
-        if outcome.early is not None and outcome.exact and outcome.early > t:
+        if outcome.early is not None and outcome.exact:
+            if outcome.early <= t:  # one event right after another
+                self._happen(t, {outcome.stopped: STOPPED})
+                return
             self._until, self._who = outcome.early, outcome.stopped
         elif not outcome.quiet:
             self._h, self._quiet = 0.5 * h, 0
-            if outcome.stopped and not self._system.slaves[outcome.stopped].has_event_mode:
+            if outcome.stopped and self._system.slaves[outcome.stopped].stops_after_events:
                 self.macro.near[outcome.stopped] = t + h
 
     def _arrive(self, t: float, values: list[float], outcome: Outcome) -> None:

@@ -64,7 +64,7 @@ def iterate_events(
     Raises
     ------
     CosimError
-        If a slave asks for iterations without end.
+        If a slave asks for iterations without end, or names a time for its next event that is not ahead.
     """
     events = {name: slave for name, slave in system.slaves.items() if slave.has_event_mode}
     for slave in events.values() if not entered else ():
@@ -98,6 +98,12 @@ def iterate_events(
         if not again:
             pending.discard(name)
         pending |= _send(system, name, sent)
+    past = next((name for name, time in handled.announced.items() if time <= t), None)
+    if past is not None:
+        raise CosimError(
+            f"{past} is at t = {t:.12g} s and says that its next event is at {handled.announced[past]:.12g} s: that is "
+            "not ahead."
+        )
     for slave in events.values():
         slave.enter_step_mode()
     return handled

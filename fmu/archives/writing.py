@@ -108,7 +108,7 @@ def replacing(target: Path, *, mode: int = 0o666, keep: bool = True) -> Iterator
     Raises
     ------
     BuildError
-        If the file cannot be made or cannot take the target's place.
+        If the file cannot be made or written, or cannot take the target's place.
     """
     # Not derived from the target's name, which may be as long as the system allows.
     temporary = target.parent / f".hybrid-fmu-{secrets.token_hex(8)}.part"
@@ -124,6 +124,11 @@ def replacing(target: Path, *, mode: int = 0o666, keep: bool = True) -> Iterator
                 os.replace(temporary, target)
             except OSError as error:
                 raise _unwritable(target, error) from error
+    except OSError as error:
+        # Where a disk is full the system names no file.
+        if error.filename is None and error.strerror:
+            raise _unwritable(target, error) from error
+        raise
     finally:
         temporary.unlink(missing_ok=True)
 

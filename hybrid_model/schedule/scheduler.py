@@ -428,7 +428,8 @@ class Scheduler:
         first = horizon
         try:
             for place in watched:
-                if self._step(place, first).event:
+                # Who stops where the others are is alone with that: there are no steps of no length.
+                if place.t < first and self._step(place, first).event:
                     stopped.append(place)
                     first = min(first, place.t)
                 if self.ended:
@@ -439,7 +440,7 @@ class Scheduler:
                     place.block.restore(state)
                     place.t = t
                     stopped = [other for other in stopped if other is not place]
-                    if self._step(place, first).event:
+                    if t < first and self._step(place, first).event:
                         stopped.append(place)
         finally:
             for place, _, state in saved:

@@ -398,6 +398,6 @@ def test_interrupted_packaging_leaves_nothing(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(zipfile.ZipFile, "writestr", full)
-    with pytest.raises(OSError, match="No space"):
+    with pytest.raises(BuildError, match=r"M\.fmu' cannot be written: No space"):
         package({"modelDescription.xml": b"<x/>"}, tmp_path / "M.fmu")
     assert leftovers(tmp_path) == set()

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from strangers import CREEPS, PANTS, REPEATS, STALLS
+from strangers import CREEPS, PANTS, PASTS, REPEATS, STALLS
 
 from cosim.cli.main import main
 from cosim.errors import CosimError
 from cosim.fmu_slave import FmuSlave
-from cosim.masters import run_event_exact, run_fixed_step
+from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.result import Ended
 from cosim.system import System
 
@@ -95,6 +95,24 @@ def test_an_fmu_that_returns_early_without_an_event_is_carried_on(stranger):
 def test_strangers_that_get_no_further_are_named(behaviour, sentence, stranger):
     with pytest.raises(CosimError, match=sentence):
         exact(System([slave_of(stranger(), behaviour=behaviour)], {}))
+
+
+@pytest.mark.parametrize("master", [run_event_exact, run_error_controlled])
+@pytest.mark.parametrize(
+    ("behaviour", "sentence"),
+    [(REPEATS, "^a gets no further than t = 0 s"), (PASTS, "^a .* its next event is at -1 s: that is not ahead")],
+)
+def test_they_are_named_among_others_too(behaviour, sentence, master, stranger):
+    slaves = [slave_of(stranger(), "a", behaviour=behaviour), slave_of(stranger(), "b")]
+    with pytest.raises(CosimError, match=sentence):
+        master(System(slaves, {"b.int32_in": "a.count"}), 1.0)
+
+
+@pytest.mark.parametrize("events", [True, False])
+def test_only_events_are_listed_where_steps_end_early_for_none(events, stranger):
+    """It ends steps at 0.03 s, for nothing, and counts at 0.5, 1, 1.5 s."""
+    system = System([slave_of(stranger(events=events), rate=2.0, behaviour=PANTS)], {})
+    np.testing.assert_allclose(run_error_controlled(system, 1.6).event_times("stranger"), [0.5, 1.0, 1.5], atol=1e-9)
 
 
 def test_an_event_that_nobody_handles_does_not_end_a_step(stranger):
