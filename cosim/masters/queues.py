@@ -39,7 +39,11 @@ def queue_of(
 
     slaves = {name: slave for name, slave in system.slaves.items() if isinstance(slave, AutomatonSlave)}
     blocks = {name: block for name, slave in slaves.items() if (block := slave.native_block) is not None}
-    joined = JoinedBlocks(blocks, system.from_slave, span, watch)
+
+    def give(name: str, variable: str, value: float) -> None:
+        slaves[name].set(variable, value)
+
+    joined = JoinedBlocks(blocks, system.from_slave, span, give, watch)
     for slave in slaves.values():
         slave.join(joined)
     return joined, NATIVE

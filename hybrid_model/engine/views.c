@@ -54,8 +54,10 @@ void engine_note_rates(Engine *engine)
 {
     const Model *m = engine->model;
     const double *rates = m->has_flow_set ? engine_values(engine, VIEW_LIVE, BANK_DERIVATIVE) : NULL;
+    if (!rates)
+        return;
     for (size_t i = 0; i < m->n_states; i++)
-        if (!rates || !isfinite(rates[i]))
+        if (!isfinite(rates[i]))
             return;
     engine_copy(engine->inner_rates, rates, m->n_states);
     engine->status->has_inner_rates = true;

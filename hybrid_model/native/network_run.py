@@ -15,7 +15,7 @@ from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.native.build.libraries import engine_library
 from hybrid_model.native.run import Ending, NativeModel, NativeRun, Options
 
-_INTERFACE = 3
+_INTERFACE = 4
 """Of `parts_interface` in parts_exports.c."""
 _BANKS = (Kind.STATE, Kind.DISCRETE, Kind.INPUT, Kind.PARAMETER, Kind.OUTPUT)
 """In the order of the engine's banks."""
@@ -34,6 +34,7 @@ class NetworkAdvance(enum.IntEnum):
     ENDED = 2
     REFUSED = 3
     STIFF = 4
+    NOT_FINITE = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,13 +96,18 @@ class EventColumns:
 
 @dataclass(frozen=True)
 class NetworkEnd:
-    """Why a network has ended: the part, how, the part's own ending, the time in s, and the particulars."""
+    """Why a network has ended: the part, how, the part's own ending, the time in s, and the particulars.
+
+    For a value that is not finite these are the input that was sent it, by its place among the part's, and the value.
+    """
 
     part: int
     how: NetworkAdvance
     ending: Ending
     t: float
     message: str
+    input: int
+    value: float
 
 
 class _Events(ctypes.Structure):
@@ -119,6 +125,8 @@ class _End(ctypes.Structure):
         ("ending", ctypes.c_int),
         ("t", ctypes.c_double),
         ("message", ctypes.c_char_p),
+        ("input", ctypes.c_uint32),
+        ("value", ctypes.c_double),
     ]
 
 
@@ -136,6 +144,7 @@ def _library() -> ctypes.CDLL:
         "parts_begin": (ctypes.c_int, [network]),
         "parts_adopt": (ctypes.c_int, [network, ctypes.c_uint32, pointer]),
         "parts_log_instants": (None, [network]),
+        "parts_require_finite": (None, [network]),
         "parts_advance": (ctypes.c_int, [network, number, size]),
         "parts_approach": (ctypes.c_int, [network, number, size]),
         "parts_next_instant": (ctypes.c_int, [network, number]),
@@ -231,6 +240,10 @@ class NativeNetwork:
         """
         _library().parts_log_instants(self._network)
 
+    def require_finite(self) -> None:
+        """Have the run end where a part is sent a value that is not finite."""
+        _library().parts_require_finite(self._network)
+
     def advance(self, target: float, events: int) -> NetworkAdvance:
         """Go on to the target, in s, or come back earlier after about so many events."""
         return NetworkAdvance(_library().parts_advance(self._network, target, events))
@@ -301,7 +314,8 @@ class NativeNetwork:
         found = _End()
         _library().parts_end(self._network, ctypes.byref(found))
         how, ending = NetworkAdvance(found.end), Ending(found.ending)
-        return NetworkEnd(int(found.part), how, ending, float(found.t), found.message.decode())
+        particulars = found.message.decode(), int(found.input), float(found.value)
+        return NetworkEnd(int(found.part), how, ending, float(found.t), *particulars)
 
     def read(self, group: int, kind: Kind) -> FloatArray:
         """Return the vectors of a kind of all parts of a group as they are, shape (parts, size)."""

@@ -34,6 +34,9 @@ class JoinedBlocks:
         events.
     span : (float, float)
         Start and end in s.
+    give : callable
+        ``give(name, variable, value)`` refuses a value that is not finite: it is called with the first that a block is
+        sent.
     watch : callable, optional
         ``watch(t)`` is called before and after the events of each instant that `advance_to` comes to.
 
@@ -48,16 +51,18 @@ class JoinedBlocks:
         blocks: Mapping[str, NativeBlock],
         wires_from: Callable[[str], Iterable[Wire]],
         span: tuple[float, float],
+        give: Callable[[str, str, float], None],
         watch: Callable[[float], None] | None = None,
     ) -> None:
         self.ticks: list[Tick] = []
         self.events: list[Event] = []
         self.ended: tuple[str, float, Termination] | None = None
-        self._t_start = span[0]
+        self._t_start, self._give = span[0], give
         self._names, self._blocks, self._watch = list(blocks), list(blocks.values()), watch
         self._numbers = {name: part for part, name in enumerate(blocks)}
         self._network = _network(self._blocks, self._names, wires_from)
         self._network.log_instants()
+        self._network.require_finite()
         self._network.start(*span, computed=False)
         for part, block in enumerate(self._blocks):
             self._network.adopt(part, block.run)
@@ -164,6 +169,8 @@ class JoinedBlocks:
             raise StiffPart
         end = self._network.end
         name, automaton = self._names[end.part], self._blocks[end.part].automaton.name
+        if end.how is NetworkAdvance.NOT_FINITE:
+            self._give(name, layout_of(self._blocks[end.part].automaton).names(Kind.INPUT)[end.input], end.value)
         if end.how is NetworkAdvance.REFUSED:
             raise SchedulingError(f"{name} {end.message}")
         if end.ending not in OF_THE_RUN:

@@ -1,9 +1,11 @@
 """Errors of one part among many of its class name the part, in all executions."""
 
+import numpy as np
 import pytest
 
 import hybrid_model as hm
 from cosim.automaton_slave import AutomatonSlave
+from cosim.errors import MisfitError
 from cosim.masters import run_event_exact
 from cosim.system import System
 
@@ -45,3 +47,38 @@ def test_an_error_of_a_slave_names_it(engine):
     slaves = [AutomatonSlave(name, part, engine=engine) for name, part in parts().items()]
     with pytest.raises(hm.SimulationError, match=r"^b: Diverges: .*sent = inf after jump 'jump' at t = 0\.5 s"):
         run_event_exact(System(slaves, WIRES), 2.0)
+
+
+class Roots(hm.HybridAutomaton):
+    """Tells the root of a number, which is below zero from t = 0.5 s on."""
+
+    x = hm.State(0.0)
+    number = hm.DiscreteState(0.5)
+    told = hm.Output(discrete=True)
+
+    def flow_map(self, s):
+        return {"x": 1.0}
+
+    def outputs(self, s):
+        return {"told": np.sqrt(s.number)}
+
+    transitions = (hm.Jump("sink", lambda self, s: s.x - s.number, lambda self, s: {"number": -1.0, "x": -9.0}),)
+
+
+class Listens(hm.HybridAutomaton):
+    """Makes nothing of what it hears."""
+
+    x = hm.State(0.0, output=True)
+    other = hm.Input(0.0, discrete=True)
+    heard = hm.Input(0.0, discrete=True)
+
+    def flow_map(self, s):
+        return {"x": 1.0}
+
+
+@pytest.mark.filterwarnings("ignore:invalid value")
+@pytest.mark.parametrize("engine", ["python", "auto"])
+def test_a_value_that_is_not_finite_is_refused_by_the_input_that_it_is_sent_to(engine):
+    slaves = [AutomatonSlave("a", Roots(), engine=engine), AutomatonSlave("b", Listens(), engine=engine)]
+    with pytest.raises(MisfitError, match=r"^b\.heard is set to nan: set a finite number\.$"):
+        run_event_exact(System(slaves, {"b.heard": "a.told"}), 2.0)

@@ -12,7 +12,7 @@
 #endif
 
 /* Changes with every change of what follows. */
-#define PARTS_INTERFACE 3
+#define PARTS_INTERFACE 4
 
 /* Events since they were taken last, in columns. */
 typedef struct {
@@ -23,12 +23,14 @@ typedef struct {
 } NetworkEvents;
 
 /* Why a network has ended, and where: a part's number, the time in s, and the engine's `Ending` of that part (ENDED_NOT
-   where the scheduler refused to go on). */
+   where the scheduler refused to go on); if that was for a value that is not finite, the input that was sent it. */
 typedef struct {
     uint32_t part;
     int end, ending;
     double t;
     const char *message;
+    uint32_t input;
+    double value;
 } NetworkEnd;
 
 EXPORT int parts_interface(void);
@@ -42,6 +44,7 @@ EXPORT int parts_start(Schedule *schedule, double start, double stop, int comput
 EXPORT int parts_begin(Schedule *schedule);
 EXPORT int parts_adopt(Schedule *schedule, uint32_t part, Engine *engine);
 EXPORT void parts_log_instants(Schedule *schedule);
+EXPORT void parts_require_finite(Schedule *schedule);
 EXPORT int parts_advance(Schedule *schedule, double target, size_t events);
 EXPORT int parts_approach(Schedule *schedule, double target, size_t events);
 EXPORT int parts_next_instant(Schedule *schedule, double limit);
@@ -118,6 +121,12 @@ void parts_log_instants(Schedule *schedule)
 {
     schedule->keeps = LOG_INSTANTS;
     schedule->log.width = 1;
+}
+
+/* Values that are not finite are not sent: the run ends there. */
+void parts_require_finite(Schedule *schedule)
+{
+    schedule->only_finite = true;
 }
 
 int parts_advance(Schedule *schedule, double target, size_t events)
@@ -199,8 +208,13 @@ void parts_end(Schedule *schedule, NetworkEnd *end)
 {
     bool refused = schedule->end == SCHEDULE_REFUSED;
     Engine *engine = schedule_at(schedule, schedule->culprit);
-    *end = (NetworkEnd){schedule->culprit, (int)schedule->end, refused ? ENDED_NOT : (int)engine->status->ending, engine_time(engine),
-                        refused ? schedule->message : engine_message(engine)};
+    *end = (NetworkEnd){.part = schedule->culprit,
+                        .end = (int)schedule->end,
+                        .ending = refused ? ENDED_NOT : (int)engine->status->ending,
+                        .t = engine_time(engine),
+                        .message = refused ? schedule->message : engine_message(engine),
+                        .input = schedule->wrong_input,
+                        .value = schedule->wrong_value};
 }
 
 void parts_read_part(Schedule *schedule, uint32_t part, int bank, double *values)

@@ -1,4 +1,5 @@
 /* One instant: jumps in the order of the parts, signals travelling at once (rule 6). */
+#include <math.h>
 #include <string.h>
 
 #include "schedule.h"
@@ -43,12 +44,24 @@ bool schedule_bring(Schedule *schedule, uint32_t i, double t, uint32_t sender)
     return true;
 }
 
+/* The run is over, since an input was sent a value that is not finite; always false. */
+static bool refuse_value(Schedule *schedule, uint32_t target, uint32_t input, double value)
+{
+    schedule->end = SCHEDULE_NOT_FINITE;
+    schedule->culprit = target;
+    schedule->wrong_input = input;
+    schedule->wrong_value = value;
+    return false;
+}
+
 /* Carries one signal over one wire; what arrives unchanged is no reception. */
 static bool carry(Schedule *schedule, uint32_t sender, uint64_t wire, double value, double t)
 {
     uint32_t target = schedule->wires.targets[wire], input = schedule->wires.inputs[wire];
     if (schedule_inputs(schedule, target)[input] == value)
         return true;
+    if (schedule->only_finite && !isfinite(value))
+        return refuse_value(schedule, target, input, value);
     if (!schedule->parts[target].touched && !schedule_bring(schedule, target, t, sender))
         return false;
     engine_set(schedule_at(schedule, target), BANK_INPUT, input, value);

@@ -75,8 +75,11 @@ typedef struct {
    whether a jump is the event that the part had come to that instant for. */
 typedef enum { LOG_NOTHING, LOG_SIGNALS, LOG_INSTANTS } LogKind;
 
-/* STIFF: a part's flow has shown that its model needs what it has not, a method for stiff flows. */
-typedef enum { SCHEDULE_GOING, SCHEDULE_REACHED, SCHEDULE_ENDED, SCHEDULE_REFUSED, SCHEDULE_STIFF } ScheduleEnd;
+/* STIFF: a part's flow has shown that its model needs what it has not, a method for stiff flows.  NOT_FINITE: a part
+   was sent a value that is not finite, where all must be. */
+typedef enum {
+    SCHEDULE_GOING, SCHEDULE_REACHED, SCHEDULE_ENDED, SCHEDULE_REFUSED, SCHEDULE_STIFF, SCHEDULE_NOT_FINITE
+} ScheduleEnd;
 
 /* Called with each visible jump of a part. */
 typedef void (*PartHook)(void *context, double time, uint32_t part, size_t jump);
@@ -113,6 +116,9 @@ typedef struct {
     size_t finished;              /* parts that have been brought to the present target */
     ScheduleEnd end;
     uint32_t culprit;             /* the part that has ended the run */
+    bool only_finite;             /* whether values that are sent must be finite, */
+    uint32_t wrong_input;         /* and which input of the culprit was sent this one */
+    double wrong_value;
     char message[MESSAGE_SIZE];
 } Schedule;
 
