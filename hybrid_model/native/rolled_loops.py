@@ -11,7 +11,6 @@ are there, or writes an element of a result.
 from __future__ import annotations
 
 import enum
-import functools
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,17 +27,18 @@ REPEATS = 48
 """Fewer repetitions stay straight lines."""
 
 Numbers = npt.NDArray[np.int64]
-_STATEMENT = re.compile(
-    r"  (?:(?P<slot>a\d+)=(?:arg\[(?P<argument>\d+)\]\? arg\[\d+\]\[(?P<element>\d+)\] : 0|"
-    r"(?P<expression>[^;\[]*));|if \(res\[(?P<result>\d+)\]!=0\) res\[\d+\]\[(?P<place>\d+)\]=(?P<given>a\d+);)\n"
-)
-_DECLARATION = re.compile(r"  casadi_real a\d+(?:, a\d+)*;\n")
+_DECLARATION = re.compile(r"  casadi_real a\d+(?:, a\d+)*;")
+_RESULT = re.compile(r"  if \(res\[(\d+)\]!=0\) res\[\1\]\[(\d+)\]=(a\d+);")
+_ELEMENT = re.compile(r"arg\[(\d+)\]\? arg\[\1\]\[(\d+)\] : 0;")
+_EXPRESSION = re.compile(r"[^;\[\]]+;")
 _SLOT = re.compile(r"\b(a\d+)\b")
-_VALUE, _CONSTANT, _PLACE = -1, -2, -3
-"""Kinds of operands; from 0 on, elements of that argument."""
-_Form: TypeAlias = tuple[tuple[str, ...], tuple[int, ...]]
+_VALUE, _CONSTANT, _PLACE, _ARGUMENTS = range(4)
+"""Kinds of operands: values of statements, constants, places in a result, and, behind these, elements of arguments."""
+_KINDS = 64
+"""More than there are: an operand is its number times that, and its kind."""
 _OPERANDS = 3
 """Of a statement, at most."""
+_Form: TypeAlias = tuple[tuple[str, ...], tuple[int, ...]]
 _NEVER = -1
 """In the place of a statement of a loop: what is carried does not change."""
 
@@ -96,45 +96,99 @@ class _Program:
 
 def _read(body: str) -> _Program | None:
     """Return the statements of a body; None where one is of another form."""
-    begin = 0
-    while declared := _DECLARATION.match(body, begin):
-        begin = declared.end()
-    forms: dict[_Form, int] = {}
-    constants: dict[str, int] = {}
-    slots: dict[str, tuple[int, int]] = {}
-    keys: list[int] = []
-    operands: list[tuple[int, ...]] = []
-    for found in _STATEMENT.finditer(body, begin):
-        if found.start() != begin:
-            return None
-        begin = found.end()
-        slot, argument, element, expression, result, place, given = found.groups()
-        if argument is not None:
-            slots[slot] = (int(argument), int(element))
-            continue
-        if result is not None:
-            texts: tuple[str, ...] = (f"if (res[{result}]!=0) res[{result}][", "]=", ";")
-            read = [(_PLACE, int(place)), slots[given]]
-        else:
-            texts, names = _around_slots(expression)
-            if not names:
-                slots[slot] = (_CONSTANT, constants.setdefault(expression, len(constants)))
-                continue
-            read = [slots[name] for name in names]
-            slots[slot] = (_VALUE, len(keys))
-        kinds, numbers = zip(*read, strict=True)
-        keys.append(forms.setdefault((texts, kinds), len(forms)))
-        operands.append((*numbers, 0, 0)[:_OPERANDS])
-    if begin != len(body) or not keys or max(len(kinds) for _, kinds in forms) > _OPERANDS:
+    reader = _Reader()
+    try:
+        for line in body.splitlines():
+            reader.take(line)
+    except _AnotherFormError:
         return None
-    return _Program(np.array(keys), np.array(operands), list(forms), list(constants))
+    return reader.program()
 
 
-@functools.lru_cache(maxsize=10_000)
-def _around_slots(expression: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return what stands around the names of values in an expression, and these names."""
-    parts = _SLOT.split(expression)
-    return tuple(parts[::2]), tuple(parts[1::2])
+class _AnotherFormError(Exception):
+    """A statement that is none of those in the head of this file."""
+
+
+class _Reader:
+    """Follows which value, constant or element is in which variable of the text, line by line."""
+
+    def __init__(self) -> None:
+        self._texts: dict[tuple[str, ...], int] = {}
+        self._constants: dict[str, int] = {}
+        self._slots: dict[str, int] = {}
+        # What stands behind the equals sign comes again and again.
+        self._known: dict[str, tuple[int, tuple[str, ...]]] = {}
+        # Of each statement the number of its form, then its operands.
+        self._rows: list[int] = []
+        self._count = 0
+
+    def take(self, line: str) -> None:
+        """Take the next line."""
+        name, equals, text = line.partition("=")
+        if name not in self._slots or not equals:
+            name = self._new(line, name)
+            if not name:
+                return
+        known = self._known.get(text)
+        if known is None:
+            known = self._known[text] = self._looked_at(text)
+        which, names = known
+        if not names:
+            self._slots[name] = which
+            return
+        slots = self._slots
+        self._rows += (which, *[slots[one] for one in names], 0, 0)[: _OPERANDS + 1]
+        slots[name] = self._count * _KINDS + _VALUE
+        self._count += 1
+
+    def program(self) -> _Program | None:
+        """Return the statements; None if there are none."""
+        if not self._count:
+            return None
+        rows = np.array(self._rows, dtype=np.int64).reshape(self._count, _OPERANDS + 1)
+        which, operands = rows[:, 0], rows[:, 1:]
+        kinds, keys = operands % _KINDS, which
+        for column in kinds.T:
+            keys = keys * _KINDS + column
+        _, first, keys = np.unique(keys, return_index=True, return_inverse=True)
+        texts = list(self._texts)
+        forms = []
+        for k in first.tolist():
+            text = texts[which[k]]
+            forms.append((text, tuple(kinds[k, : len(text) - 1].tolist())))
+        return _Program(keys, operands // _KINDS, forms, list(self._constants))
+
+    def _new(self, line: str, name: str) -> str:
+        """Take a line that gives no value to a variable that is known; return the variable if it is a new one."""
+        written = _RESULT.fullmatch(line)
+        if written is not None:
+            result, place, given = written.groups()
+            texts = (f"if (res[{result}]!=0) res[{result}][", "]=", ";")
+            slot = self._slots[f"  {given}"]
+            form = self._texts.setdefault(texts, len(self._texts))
+            self._rows += (form, int(place) * _KINDS + _PLACE, slot, 0)
+            self._count += 1
+            return ""
+        if _DECLARATION.fullmatch(line):
+            return ""
+        if not _SLOT.fullmatch(name.strip()):
+            raise _AnotherFormError
+        return name
+
+    def _looked_at(self, text: str) -> tuple[int, tuple[str, ...]]:
+        """Return the number of a form and the variables that it reads; an element or a constant if there are none."""
+        element = _ELEMENT.fullmatch(text)
+        if element is not None and int(element[1]) < _KINDS - _ARGUMENTS:
+            return int(element[2]) * _KINDS + _ARGUMENTS + int(element[1]), ()
+        if not _EXPRESSION.fullmatch(text):
+            raise _AnotherFormError
+        parts = _SLOT.split(text[:-1])
+        if len(parts) == 1:
+            return self._constants.setdefault(parts[0], len(self._constants)) * _KINDS + _CONSTANT, ()
+        if len(parts) > 2 * _OPERANDS + 1:
+            raise _AnotherFormError
+        texts = tuple(parts[::2])
+        return self._texts.setdefault(texts, len(self._texts)), tuple(f"  {part}" for part in parts[1::2])
 
 
 class _Writer:
@@ -218,7 +272,7 @@ class _Writer:
             return f"v{number}" if self._run_of[number] < 0 else f"w[{self._stored[number]}]"
         if kind == _CONSTANT:
             return f"({self._program.constants[number]})"
-        return str(number) if kind == _PLACE else f"(arg[{kind}]? arg[{kind}][{number}] : 0)"
+        return str(number) if kind == _PLACE else _element(kind, str(number))
 
     def _loop(self, run: Run) -> list[str]:
         program, lines = self._program, []
@@ -255,7 +309,7 @@ class _Writer:
         if kind == _CONSTANT:
             return self._table("casadi_real", [self._program.constants[n] for n in numbers.tolist()])
         index = self._index(numbers)
-        return index if kind == _PLACE else f"(arg[{kind}]? arg[{kind}][{index}] : 0)"
+        return index if kind == _PLACE else _element(kind, index)
 
     def _index(self, numbers: Numbers) -> str:
         """Return an index that takes these values one after the other."""
@@ -270,6 +324,11 @@ class _Writer:
             self._known_tables[text] = f"t{len(self._tables)}"
             self._tables.append(f"static const {kind} {self._known_tables[text]}[]={{{text}}};")
         return f"{self._known_tables[text]}[i]"
+
+
+def _element(kind: int, index: str) -> str:
+    argument = kind - _ARGUMENTS
+    return f"(arg[{argument}]? arg[{argument}][{index}] : 0)"
 
 
 class _Relation(enum.Enum):
