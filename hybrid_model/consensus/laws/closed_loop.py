@@ -122,7 +122,7 @@ def _own_weights(given: Waveform | Sequence[Waveform] | TimeFunction, edges: int
 
 def edges_of(scenario: Scenario, number: int) -> list[int]:
     """Return the edges of agent `number`, as indices from 0 into the network's list."""
-    return [k for k, edge in enumerate(scenario.network.edges) if number in edge]
+    return scenario.network.edges_at[number - 1]
 
 
 def other_end(scenario: Scenario, edge: int, number: int) -> int:

@@ -82,6 +82,15 @@ class Network:
         return 10.0 ** math.ceil(math.log10(largest)) if min(sizes) < _NOTHING * largest else None
 
     @cached_property
+    def edges_at(self) -> tuple[list[int], ...]:
+        """Of each agent its edges, as indices from 0 into the list."""
+        found: tuple[list[int], ...] = tuple([] for _ in range(self.agents))
+        for k, edge in enumerate(self.edges):
+            for agent in edge:
+                found[agent - 1].append(k)
+        return found
+
+    @cached_property
     def underlying_edges(self) -> tuple[Edge, ...]:
         """Edges of the underlying graph: the listed ones first, in their order."""
         return complete_edges(self.agents, self.edges) if self.underlying is Underlying.COMPLETE else self.edges
