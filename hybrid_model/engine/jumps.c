@@ -236,8 +236,7 @@ static bool take_jump(Engine *engine, size_t jump)
     if (!going && engine->problem != ENDED_JUMPS)
         return engine_end_run(engine);
     if (engine->model->jumps[jump].kind == JUMP_ON_STATE)
-        engine->live.level[engine->model->jumps[jump].index] = 0.0;
-    engine->live.level[engine->model->n_margins] = 0.0;
+        engine->live.level[engine->model->jumps[jump].index] = engine->live.level[engine->model->n_margins] = 0.0;
     engine->ticked[jump] = 1;
     if (engine->jump_hook)
         engine->jump_hook(engine->jump_context, *engine->live.time, jump);

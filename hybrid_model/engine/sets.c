@@ -148,7 +148,10 @@ bool engine_leads_out(Engine *engine, const Point *point, double margin, bool *o
     const ModelScales *scales = &engine->model->scales;
     bool shown;
     double h, t = *point->time, size = shown_size(engine, point, &shown);
-    if (!engine_first_step(engine, point, fmax(status->stop_time, t), size, &h))
+    /* At the end of the run no step is left to measure by. */
+    if (!(status->stop_time > t))
+        h = t - status->start_time;
+    else if (!engine_first_step(engine, point, status->stop_time, size, &h))
         return false;
     double probe = scales->probe * h, change, twice;
     /* As long as no state has shown its size, the step may be far too long. */

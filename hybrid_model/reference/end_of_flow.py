@@ -19,14 +19,18 @@ def raise_levels(point: Point, piece: FlowPiece) -> None:
     """Enable the guards that would cross within one instant if the flow did not end with this piece.
 
     A flow that ends at a time event may not go on to see whether a guard reaches zero a rounding later. Such a
-    guard counts as crossed: it is due as long as no jump lowers its margin.
+    guard counts as crossed: it is due as long as no jump lowers its margin. Under flow priority the flow set counts
+    as left likewise.
     """
-    if point.guards == 0 or point.automaton.priority is Priority.FLOW:
+    if point.guards == 0:
         return
     then = one_instant_on(point, FlowMap(point, piece.t1)(piece.t1, piece.x1))
-    if then is not None:
-        now = _guards(point)
-        point.enable_from(np.where((now < 0.0) & (then[: point.guards] >= 0.0), now, 0.0))
+    if then is None:
+        return
+    now = point.margins(point.t, point.x)
+    guards, soon = now[: point.guards], then[: point.guards]
+    leaves = point.automaton.priority is Priority.FLOW and point.automaton.has_flow_set and now[-1] > 0.0 > then[-1]
+    point.enable_from(np.where((guards < 0.0) & (soon >= 0.0), guards, 0.0), float(now[-1]) if leaves else 0.0)
 
 
 def go_on_to(point: Point, time_event: float) -> FlowPiece:

@@ -176,7 +176,7 @@ class Execution(Point):
         if not self.automaton.has_flow_set:
             return False
         margin = self.flow_margin()
-        if margin > 0.0:
+        if margin > self.exit_level:
             return False
         return margin < -border(self, self.t, self.x) or leads_out(self)
 

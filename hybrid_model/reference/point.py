@@ -69,6 +69,8 @@ class Point:
     levels : ndarray
         The margin from which on each jump on state is due: zero, or slightly below where the crossing is so near to the
         end of a flow that it counts as reached (rule 6).
+    exit_level : float
+        The margin of the flow set up to which it counts as left under flow priority: zero, or slightly above likewise.
     looks : Looks
         Whether its flow chatters.
     """
@@ -105,6 +107,7 @@ class Point:
         self.floor = 0.0
         self.next_step: float | None = None
         self.levels: FloatArray = np.zeros(self.guards)
+        self.exit_level = 0.0
         self.looks = Looks(self.t)
         self.compute_start()
 
@@ -169,15 +172,15 @@ class Point:
             self.t_jump = self.t
         if self.on_state[index]:
             self.levels = self.levels.copy()
-            self.levels[self.row(index)] = 0.0
+            self.levels[self.row(index)] = self.exit_level = 0.0
 
     def clear_levels(self) -> None:
-        """Let guards be due from zero on."""
-        self.levels = np.zeros(self.guards)
+        """Let guards be due from zero on, and the flow set be left there."""
+        self.levels, self.exit_level = np.zeros(self.guards), 0.0
 
-    def enable_from(self, levels: FloatArray) -> None:
-        """Let guards be due from these margins on, which are zero or below."""
-        self.levels = levels
+    def enable_from(self, levels: FloatArray, exit_level: float = 0.0) -> None:
+        """Let guards be due from these margins on, which are zero or below, and the flow set be left at that one."""
+        self.levels, self.exit_level = levels, exit_level
 
     def propose_step(self, length: float | None) -> None:
         """Note how long the solver would have its next step, in s."""

@@ -170,3 +170,35 @@ def test_levels_at_the_end_of_a_run_are_met_together_in_the_order_of_the_parts(r
     parts = {"a": Stairs(rate=rates[0]), "b": Stairs(rate=rates[1]), "c": Relaxing()}
     arc = hm.simulate(hm.Composition("stairs", parts, {}), 3.0, engine=engine)
     assert [jump.name for jump in arc.jumps if jump.t > 2.95 and "tick" in jump.name] == ["a.tick", "b.tick"]
+
+
+class Climb(hm.HybridAutomaton):
+    """Climbs for as long as it may, by flow priority, and begins anew; a clock ticks once."""
+
+    rate = hm.Parameter(1.0)
+    top = hm.Parameter(1.0)
+    at = hm.Parameter(1.0)
+    x = hm.State(0.0)
+    ticks = hm.DiscreteState(0)
+    priority = hm.Priority.FLOW
+
+    def flow_map(self, s):
+        return {"x": s.rate}
+
+    def flow_set(self, s):
+        return s.top - s.x
+
+    transitions = (
+        hm.TimeEvent("tick", lambda self, s: np.where(s.ticks < 0.5, s.at, np.inf), lambda self, s: {"ticks": 1}),
+        hm.Jump("again", lambda self, s: s.x - s.top, lambda self, s: {"x": 0.0}),
+    )
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+@pytest.mark.parametrize("at", [2.9, 9.0])
+@pytest.mark.parametrize("rate", [1.0, 0.1, 0.3, 0.7])
+def test_a_flow_that_ends_with_the_run_is_over(rate, at, engine):
+    """Where the flow leads is seen from where it came, as there is no time left."""
+    climb = Climb(rate=rate, top=2.9 * rate, at=at)
+    ends, goes_on = ([jump.name for jump in hm.simulate(climb, t_end, engine=engine).jumps] for t_end in (2.9, 3.0))
+    assert ends == goes_on == (["tick", "again"] if at < 3.0 else ["again"])

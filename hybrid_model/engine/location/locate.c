@@ -169,26 +169,14 @@ static bool raise_guards(Engine *engine, const Point *point, double t, double ah
     return true;
 }
 
-bool engine_raise_levels(Engine *engine, const Point *point, double t)
-{
-    return engine->model->flow_priority || raise_guards(engine, point, t, engine_one_instant(engine, t));
-}
-
-bool engine_raise_levels_here(Engine *engine, const Point *point)
+/* A flow set that would be left within one instant after t, at the state x, counts as left where flow has priority. */
+static bool raise_exit(Engine *engine, const Point *point, double t, const double *x, double ahead)
 {
     const Model *m = engine->model;
-    /* An importer that integrates by itself locates less finely. */
-    double now, t = *point->time, ahead = IMPORTER_INSTANTS * engine_one_instant(engine, t);
-    double earlier = fmax(t - ahead, engine->status->start_time);
-    engine_note_sizes(engine, point);
-    /* An importer may locate an event a little behind its guard, where the flow map need not be defined. */
-    if (!engine_step_begin(engine, point))
-        return true;
-    if (!raise_guards(engine, point, t, ahead))
-        return false;
+    double now, earlier = fmax(t - ahead, engine->status->start_time);
     if (!m->flow_priority || !m->has_flow_set)
         return true;
-    if (!engine_evaluate_flow_set(engine, t, point->x, point->z, &now))
+    if (!engine_evaluate_flow_set(engine, t, x, point->z, &now))
         return false;
     double before = now;
     if (earlier < t && engine_step_probe(engine, point, earlier) &&
@@ -196,6 +184,24 @@ bool engine_raise_levels_here(Engine *engine, const Point *point)
         now + (now - before) * ahead / (t - earlier) < 0.0)
         point->level[m->n_margins] = now;
     return true;
+}
+
+bool engine_raise_levels(Engine *engine, const Point *point, double t)
+{
+    const Step *step = &engine->step;
+    double ahead = engine_one_instant(engine, t);
+    const double *x = t == step->t0 ? step->x0 : t == step->t1 ? step->x1 : engine->probe_x;
+    return raise_guards(engine, point, t, ahead) && raise_exit(engine, point, t, x, ahead);
+}
+
+bool engine_raise_levels_here(Engine *engine, const Point *point)
+{
+    /* An importer that integrates by itself locates less finely. */
+    double t = *point->time, ahead = IMPORTER_INSTANTS * engine_one_instant(engine, t);
+    engine_note_sizes(engine, point);
+    /* An importer may locate an event a little behind its guard, where the flow map need not be defined. */
+    return !engine_step_begin(engine, point) ||
+           (raise_guards(engine, point, t, ahead) && raise_exit(engine, point, t, point->x, ahead));
 }
 
 bool engine_reach_guard(Engine *engine, const Point *point, double limit)
