@@ -168,10 +168,11 @@ class ComputedValues(ArcValues):
     def __init__(self, automaton: Automaton, signals: Inputs, compiled: CompiledOutputs | None = None) -> None:
         super().__init__(automaton)
         self._signals, self._compiled = signals, compiled
+        self._computed: tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray] | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         # What is compiled belongs to this process.
-        return {**self.__dict__, "_compiled": None}
+        return {**self.__dict__, "_compiled": None, "_computed": None}
 
     def states(self, x: FloatArray) -> FloatArray:
         """See `ArcValues.states`."""
@@ -201,7 +202,14 @@ class ComputedValues(ArcValues):
         if self._compiled is not None and len(t) and size:
             p = [self.parameters(float(s)) for s in t]
             rows = self._compiled([t, x, z, np.array(self._inputs_along(t, x, z)), np.array(p)], size)
-        return super().outputs_along(t, x, z) if rows is None else rows
+        return self._once_for_all_outputs(t, x, z) if rows is None else rows
+
+    def _once_for_all_outputs(self, t: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
+        """Return the output vectors at points; whoever reads one output after the other there has them computed once."""
+        points = (t, x, z)
+        if self._computed is None or not all(map(np.array_equal, points, self._computed[0])):
+            self._computed = (np.array(t), np.array(x), np.array(z)), super().outputs_along(t, x, z)
+        return self._computed[1]
 
 
 class ReceivedValues(ComputedValues):

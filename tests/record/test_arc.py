@@ -162,3 +162,29 @@ def test_an_arc_does_not_change_when_its_automaton_runs_again():
     before = arc["h"].copy()
     hm.simulate(automaton, 2.0)
     np.testing.assert_array_equal(arc["h"], before)
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+def test_outputs_are_computed_once_for_all_who_read_them_at_the_same_times(engine):
+    calls = []
+
+    class Counted(hm.HybridAutomaton):
+        x = hm.State(0.0)
+        a, b = hm.Output(), hm.Output()
+
+        def flow_map(self, s):
+            return {"x": 1.0}
+
+        def outputs(self, s):
+            calls.append(s.t)
+            return {"a": 2.0 * s.x, "b": s.t - s.x}
+
+    arc = hm.simulate(Counted(), 1.0, engine=engine)
+    grid = np.linspace(0.0, 1.0, 11)
+    first = arc.at("a", grid)
+    first[:] = np.nan  # belongs to the caller
+    before = len(calls)
+    np.testing.assert_allclose(arc.at("b", grid), 0.0, atol=1e-12)
+    np.testing.assert_allclose(arc.at("a", grid), 2.0 * grid, atol=1e-12)
+    assert len(calls) == before
+    np.testing.assert_allclose(arc.at("a", grid[:5] + 0.05), 2.0 * grid[:5] + 0.1, atol=1e-12)
