@@ -10,6 +10,7 @@ from rescaled import InOtherTime
 from scipy.interpolate import interp1d
 
 import hybrid_model as hm
+from hybrid_model.reference import progress
 
 QUICK = ["bouncing_ball", "resting_ball", "relay_hysteresis", "two_tank", "sampled_lti_loop", "thermostat"]
 
@@ -147,9 +148,9 @@ LEFT = 0.356466736
 def test_a_flow_map_that_is_defined_up_to_the_guard_only_reaches_it(emptying, method):
     exact = method in ("DOP853", "RK45")
     solver = hm.Solver(method=method) if exact else hm.Solver(method=method, rtol=1e-7, atol=1e-9)
-    arc = hm.simulate(emptying(), 5.0 if exact else 2.0, solver=solver)
+    arc = hm.simulate(emptying(), 5.0 if exact else 1.0, solver=solver)
     assert arc.stop is hm.Stop.HORIZON
-    times = EMPTY * np.arange(1, 6 if exact else 3)
+    times = EMPTY * np.arange(1, 6 if exact else 2)
     assert arc.event_times("jump") == pytest.approx(times, abs=1e-11 if exact else 1e-5)
     if exact:
         assert arc.end.h == pytest.approx(LEFT, abs=1e-9)
@@ -198,8 +199,13 @@ def test_where_no_guard_is_near_the_message_names_the_remedy():
         hm.simulate(Leak(), 10.0)
 
 
-def test_a_flow_that_creeps_is_given_up_with_the_time_and_the_remedy():
-    """Two tanks joined by an orifice: past their equilibrium an implicit method makes steps of nothing."""
+@pytest.mark.parametrize("window", [200, pytest.param(progress.PACE_STEPS, marks=pytest.mark.long)])
+def test_a_flow_that_creeps_is_given_up_with_the_time_and_the_remedy(window, monkeypatch):
+    """Two tanks joined by an orifice: past their equilibrium an implicit method makes steps of nothing.
+
+    The pace is measured over a window of steps; a step takes milliseconds there.
+    """
+    monkeypatch.setattr(progress, "PACE_STEPS", window)
 
     class Tanks(hm.HybridAutomaton):
         a = hm.State(1.0)
@@ -209,5 +215,5 @@ def test_a_flow_that_creeps_is_given_up_with_the_time_and_the_remedy():
             flow = np.sign(s.a - s.b) * np.sqrt(abs(s.a - s.b))
             return {"a": -flow, "b": flow}
 
-    with pytest.raises(hm.SimulationError, match=r"creeps: .* t = 1.*modes with a switch"):
+    with pytest.raises(hm.SimulationError, match=rf"creeps: its last {window} steps .* t = 1.*modes with a switch"):
         hm.simulate(Tanks(), 10.0, solver=hm.Solver(method="Radau"), engine="python")
