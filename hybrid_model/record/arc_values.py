@@ -205,7 +205,7 @@ class ComputedValues(ArcValues):
         return self._once_for_all_outputs(t, x, z) if rows is None else rows
 
     def _once_for_all_outputs(self, t: FloatArray, x: FloatArray, z: FloatArray) -> FloatArray:
-        """Return the output vectors at points; whoever reads one output after the other there has them computed once."""
+        """Return the output vectors at points, computed once for all who read one of them after the other there."""
         points = (t, x, z)
         if self._computed is None or not all(map(np.array_equal, points, self._computed[0])):
             self._computed = (np.array(t), np.array(x), np.array(z)), super().outputs_along(t, x, z)
