@@ -29,7 +29,7 @@ from cosim.masters.standing_signals import standing_still
 from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
-from cosim.systems.assembly import assemble
+from cosim.systems.assembly import assemble, sizes_first
 from cosim.systems.definition import AUTOMATON, FMU, Component, Experiment, SystemDefinition
 from cosim.systems.files import read_system
 from cosim.systems.ssp_writing import write_osp, write_ssp
@@ -181,10 +181,10 @@ def _agents(scenario: Scenario, folder: Path, fmi: str) -> System:
 
 
 def _set_starts(slaves: dict[str, Slave], starts: dict[str, str]) -> None:
-    for name, text in starts.items():
+    for name in sizes_first(starts):
         slave, own = _owner(slaves, name)
         try:
-            slave.set(own, slave.parse(own, text))
+            slave.set(own, slave.parse(own, starts[name]))
         except CosimError as error:
             raise UsageError(f"--start-value: {error}") from error
 

@@ -53,13 +53,18 @@ def assemble(
     """
     slaves = [_slave(component, validate, patience if isolate else None) for component in definition.components]
     for component, slave in zip(definition.components, slaves, strict=True):
-        for name, value in component.start.items():
-            set_start(slave, name, value)
+        for name in sizes_first(component.start):
+            set_start(slave, name, component.start[name])
     by_name = {slave.name: slave for slave in slaves}
     if prepare is not None:
         prepare(by_name)
     connections = unplugged(definition, by_name)
     return System(slaves, connections, loop_iterations=loop_iterations)
+
+
+def sizes_first(start: Mapping[str, Any]) -> list[str]:
+    """Return the names of start values, those of arrays and elements last: their sizes may be among the others."""
+    return sorted(start, key=lambda name: "[" in name or isinstance(start[name], (list, tuple)))
 
 
 def set_start(slave: Slave, name: str, value: Any) -> None:

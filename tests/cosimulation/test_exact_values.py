@@ -15,6 +15,8 @@ from cosim.fmu_slave import FmuSlave
 from cosim.isolation.isolated_slave import IsolatedSlave
 from cosim.masters import run_event_exact, run_fixed_step
 from cosim.system import System
+from cosim.systems.assembly import assemble
+from cosim.systems.files import read_system
 
 
 def echoed(path, kind, text):
@@ -184,10 +186,18 @@ def test_outputs_have_the_sizes_that_the_command_gives_them(size, weights_out, t
 def test_structural_parameters_are_set_in_configuration_mode(stranger, capsys):
     """The array gets its new size, and weights of 1; the second of them is then set."""
     starts = ["--start-value", "size=4", "--start-value", "weights[4]=2.5"]
-    assert main(["cosim", str(stranger()), *starts]) == 0
-    assert "stranger.total = 5.5" in capsys.readouterr().out
+    for given in (starts, starts[2:] + starts[:2]):
+        assert main(["cosim", str(stranger()), *given]) == 0
+        assert "stranger.total = 5.5" in capsys.readouterr().out
     assert main(["cosim", str(stranger()), "--start-value", "weights[4]=2.5"]) == 2
     assert "stranger has no variable 'weights[4]'" in capsys.readouterr().err
+
+
+def test_sizes_come_before_arrays_whatever_their_order_in_a_file(stranger, tmp_path):
+    (tmp_path / "system.toml").write_text(
+        f'[components.a]\nfmu = "{stranger()}"\nstart = {{ weights = [1.0, 2.0, 3.0], size = 3 }}\n'
+    )
+    assert run_fixed_step(assemble(read_system(tmp_path / "system.toml")), 0.1, 0.1).final["a.total"] == 6.0
 
 
 @pytest.mark.parametrize("size", [1, 4])
