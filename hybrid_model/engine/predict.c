@@ -220,6 +220,9 @@ FlowEnd engine_flow_on(Engine *engine, EventPolicy policy, bool ahead, size_t *b
         status->has_segment = false;
         engine_copy_point(engine, &engine->predicted, live);
         *foreseen = prediction != PREDICTION_STEP;
+        /* A look ahead that has ended at a breakpoint has left it to whoever comes there. */
+        if (prediction == PREDICTION_RENEWAL && !engine_take_internal_jumps(engine, live))
+            return FLOW_PROBLEM;
         if (*foreseen)
             return FLOW_EVENT;
     }
