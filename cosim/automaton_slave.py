@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.errors import CosimError, MisfitError
-from cosim.slave import Measure, Port, Slave
+from cosim.measure import Measure
+from cosim.slave import Port, Slave
 from fmu.importer.values import Value
 from fmu.standard.units import base_unit
 from hybrid_model import Automaton, Execution, Solver, ZenoGuard

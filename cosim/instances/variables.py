@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.slave import Measure, Port
+from cosim.measure import Measure
+from cosim.slave import Port
 from fmu.standard.units import BASE_UNITS
 from fmu.standard.value_types import DISCRETE, INTEGERS, TYPES
 

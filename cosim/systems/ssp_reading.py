@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import MisfitError
-from cosim.slave import Measure
+from cosim.measure import Measure
 from cosim.sources import Linear, Source
 from cosim.systems.definition import FMU, Component, Experiment, SystemDefinition
 from cosim.systems.ssp_units import REAL, Node, SspUnits, Unit, Wire, measure_of, told

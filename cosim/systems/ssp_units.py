@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import MisfitError
-from cosim.slave import Measure
+from cosim.measure import Measure
 from fmu.standard.units import BASE_UNITS
 
 Node = tuple[str, str]

@@ -11,7 +11,7 @@ from cosim.automaton_slave import AutomatonSlave
 from cosim.errors import MisfitError
 from cosim.fmu_slave import FmuSlave
 from cosim.masters import run_event_exact, run_fixed_step
-from cosim.slave import Measure
+from cosim.measure import Measure
 from cosim.system import System
 from fmu.export import export_fmu
 from hybrid_model.models import BouncingBall
