@@ -9,6 +9,7 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from certified import coarse
 from PIL import Image
 
 import hybrid_model as hm
@@ -82,7 +83,7 @@ def test_weights_without_a_period_have_the_bounds_that_there_are(ax):
     drawn = {"kind": "random-dwell", "active": [[1, 2], [2, 3], [1, 3]], "shortest": 0.3, "longest": 0.9, "seed": 5}
     scenario = read_scenario({**entries, "stop_time": 10.0, "switching": drawn})
     arc = hm.simulate(closed_loop(scenario), scenario.stop_time)
-    found = certify(scenario, arc)
+    found = coarse(scenario, arc)
     assert found.value("rate", "floquet") is None
     plot_edge_norm(scenario, arc, ax=ax, found=found)
     told = [text.get_text() for text in ax.get_legend().get_texts()]
