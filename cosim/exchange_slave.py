@@ -132,7 +132,7 @@ class ExchangeSlave(FmuSlave):
     def restore(self, state: Any) -> None:
         """See `Block.restore`."""
         super().restore(state)
-        self._t, self._due, x, self._atol, above, self._length = state[2]
+        self._t, self._due, x, self._atol, above, self._length = state[-1]
         self._x, self._above = x.copy(), above.copy()
 
     @property

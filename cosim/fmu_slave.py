@@ -264,12 +264,13 @@ class FmuSlave(Slave):
         """See `Block.save`; CosimError if the FMU cannot save its state."""
         if not self.can_restore:
             raise CosimError(f"{self.name} cannot save its state: its canGetAndSetFMUState is false.")
-        return self.calls(self._instance.save), self._running.held()
+        return self.calls(self._instance.save), self._running.held(), self._idle
 
     def restore(self, state: Any) -> None:
         """See `Block.restore`."""
         self.calls(self._instance.restore, state[0])
         self._running.recall(state[1])
+        self._idle = state[2]
 
     def release(self, state: Any) -> None:
         """See `Block.release`."""

@@ -311,6 +311,8 @@ class _Run:
         self._row(t)
         for name in due:
             self.macro.near.pop(name, None)
+        if self._who in due:  # it may have taken the event that it named a little before
+            self._until = math.inf
         before = len(result.ticks)
         handled = iterate_events(system, result, t, lambda: self._changes.arrive(t), self.macro.settle)
         self._go_on(t, handled)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Collection, Mapping
 from dataclasses import fields
@@ -16,6 +17,8 @@ from cosim.systems.definition import AUTOMATON, FMU, Component, Experiment, Syst
 _TABLES = ("name", "experiment", "components", "connections", "inputs")
 _COMPONENT = (FMU, AUTOMATON, "start", "arguments", "interface")
 INTERFACES = ("cs", "me")
+LEAST_WHOLE, LARGEST_WHOLE = -(2**63), 2**64 - 1
+"""Of the types of FMI."""
 
 
 def is_system(path: str | Path) -> bool:
@@ -71,9 +74,13 @@ def _source(path: Path, target: str, given: Any) -> Source:
         isinstance(given, dict)
         and isinstance(given.get("from"), str)
         and len(given) == 1 + len(numbers)
-        and all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in numbers.values())
+        and all(_is_number(value) for value in numbers.values())
     ):
-        return Linear(given["from"], float(numbers.get("factor", 1.0)), float(numbers.get("offset", 0.0)))
+        factor, offset = (
+            _finite(path, f"connections.{target!r}.{name}", numbers.get(name, default))
+            for name, default in (("factor", 1.0), ("offset", 0.0))
+        )
+        return Linear(given["from"], factor, offset)
     raise MisfitError(
         f"{path}: connections.{target!r} is {given!r}: give the name of an output, a list of them, or "
         '{ from = "a.y", factor = 2.0, offset = 0.0 }. Names with points are quoted: "b.u" = "a.y".'
@@ -99,7 +106,33 @@ def _component(path: Path, folder: Path, name: str, entry: Any) -> Component:
     if kinds[0] == FMU:
         _require_file(path, f"{where}.fmu", Path(source))
     start, arguments = (_table(path, entry, key, f"{where}.") for key in ("start", "arguments"))
+    for variable, value in start.items():
+        _require_value(path, f"{where}.start.{variable}", value)
     return Component(name, kinds[0], source, start, arguments, interface)
+
+
+def _require_value(path: Path, where: str, value: Any) -> None:
+    """Refuse what no variable holds; tables are the matter of those who know the variables."""
+    for part in value if isinstance(value, list) else ():
+        _require_value(path, where, part)
+    if not isinstance(value, (bool, int, float, str, list, dict)):
+        raise MisfitError(f"{path}: {where} is {value}: give a number, true or false, text, or a list of them.")
+    if isinstance(value, int) and not LEAST_WHOLE <= value <= LARGEST_WHOLE:
+        raise MisfitError(f"{path}: {where} is a whole number of more than 64 bits: give a smaller one.")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _finite(path: Path, where: str, value: int | float) -> float:
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise MisfitError(f"{path}: {where} is {number}: give a finite number.")
+    return number
 
 
 def _inputs(path: Path, table: Mapping[str, Any]) -> Path | None:
@@ -121,12 +154,13 @@ def _experiment(path: Path, entry: Mapping[str, Any]) -> Experiment:
     known = [field.name for field in fields(Experiment)]
     _require_known(path, "experiment.", entry, known)
     for name, value in entry.items():
-        number = isinstance(value, (int, float)) and not isinstance(value, bool)
         if name == "master" and not isinstance(value, str):
             raise MisfitError(f"{path}: experiment.master is {value!r}: give the name of one.")
-        if name != "master" and not number:
+        if name != "master" and not _is_number(value):
             raise MisfitError(f"{path}: experiment.{name} is {value!r}: give a number.")
-    numbers: dict[str, Any] = {name: float(value) for name, value in entry.items() if name != "master"}
+    numbers: dict[str, Any] = {
+        name: _finite(path, f"experiment.{name}", value) for name, value in entry.items() if name != "master"
+    }
     return Experiment(**numbers, master=entry.get("master"))
 
 

@@ -148,3 +148,82 @@ def test_what_cannot_save_its_state_is_run_again_up_to_where_it_is_to_return(eve
     monkeypatch.setattr("cosim.replayed_slave.MOST_REPEATED", 3)
     with pytest.raises(CosimError, match=r"cannot save its state, and .* use the fixed-step master"):
         run()
+
+
+class Saw(hm.HybridAutomaton):
+    """A saw: it rises along a line and falls from one to zero."""
+
+    x = hm.State(0.0, output=True)
+    slope = hm.Parameter(0.7)
+
+    def flow_map(self, s):
+        return {"x": s.slope}
+
+    transitions = (hm.Jump("fall", lambda self, s: s.x - 1.0, lambda self, s: {"x": 0.0}),)
+
+
+class Integral(hm.HybridAutomaton):
+    u = hm.Input(0.0)
+    total = hm.State(0.0, output=True)
+
+    def flow_map(self, s):
+        return {"total": s.u}
+
+
+class Beats(hm.HybridAutomaton):
+    """Sends its number, every period."""
+
+    heard = hm.Input(0.0, discrete=True)
+    period = hm.Parameter(0.5)
+    sent = hm.DiscreteState(0.0, output=True)
+
+    transitions = (
+        hm.TimeEvent("beat", lambda self, s: (s.sent + 1.0) * s.period, lambda self, s: {"sent": s.sent + 1.0}),
+    )
+
+
+@pytest.mark.parametrize("version", ["2.0", None])
+def test_what_flows_from_zero_does_not_jump(version, exported):
+    """The integral of 0.7 t from zero: each step of no length changes it by a large part of what it was."""
+    source = FmuSlave("a", exported(Saw(), "saw", version)) if version else AutomatonSlave("a", Saw())
+    slaves = [source, FmuSlave("b", exported(Integral(), "integral", "2.0"))]
+    result = run_error_controlled(System(slaves, {"b.u": "a.x"}), 2.0)
+    # It has fallen once: a triangle of height 1, and a part of another.
+    assert result.final["b.total"] == pytest.approx(0.5 / 0.7 + 0.35 * (2.0 - 1.0 / 0.7) ** 2, abs=1e-8)
+    np.testing.assert_allclose(result.event_times("a"), [1.0 / 0.7], atol=1e-7, rtol=0)
+    assert result.event_times("b").size == 0
+
+
+@pytest.mark.parametrize("announcing", ["a", "b"])
+def test_an_announced_event_is_listed_beside_a_hidden_one(announcing, exported):
+    """To keep the row before the hidden one all go back, and have no event there."""
+    slaves = [FmuSlave(n, exported(Beats(), "beats", "3.0" if n == announcing else "2.0")) for n in "ab"]
+    slaves[1].set("period", 0.25)
+    result = run_error_controlled(System(slaves, WIRES), 1.1, output_interval=0.1)
+    np.testing.assert_allclose(result.event_times("a"), [0.5, 1.0], atol=1e-12, rtol=0)
+    np.testing.assert_allclose(result.event_times("b"), [0.25, 0.5, 0.75, 1.0], atol=1e-12, rtol=0)
+
+
+class CountsFalls(hm.HybridAutomaton):
+    """Counts how often its input has fallen."""
+
+    u = hm.Input(0.0)
+    high = hm.DiscreteState(0.0)
+    count = hm.DiscreteState(0.0, output=True)
+
+    transitions = (
+        hm.Jump("rise", lambda self, s: hm.least(s.u - 0.75, 0.5 - s.high), lambda self, s: {"high": 1.0}),
+        hm.Jump(
+            "fall",
+            lambda self, s: hm.least(0.25 - s.u, s.high - 0.5),
+            lambda self, s: {"high": 0.0, "count": s.count + 1.0},
+        ),
+    )
+
+
+def test_an_event_that_was_named_and_is_taken_a_little_before_is_listed_once(exported):
+    slaves = [FmuSlave("a", exported(Saw(), "saw", "2.0")), FmuSlave("b", exported(CountsFalls(), "counts", "2.0"))]
+    result = run_error_controlled(System(slaves, {"b.u": "a.x"}), 2.0)
+    for name in "ab":
+        np.testing.assert_allclose(result.event_times(name), [1.0 / 0.7], atol=1e-7, rtol=0)
+    assert result.final["b.count"] == 1.0

@@ -100,6 +100,15 @@ def test_options_go_before_what_the_file_says(folder, capsys):
         ('"sum.many" =', "sum.many =", "connections.'sum' is .*Names with points are quoted"),
         ("[experiment]", "[experiment", "cannot be read as TOML"),
         ('automaton = "blocks.py:Sum"', 'fmu = "x.fmu"\ninterface = "se"', "interface is 'se': give one of cs, me"),
+        ("stop_time = 2.2", f"stop_time = {10**400}", "experiment.stop_time is inf: give a finite number"),
+        ("period = 0.5", "period = 2026-01-01", "components.a.start.period is 2026-01-01: give a number"),
+        ("period = 0.5", "period = [1, 2026-01-01]", "components.a.start.period is 2026-01-01: give a number"),
+        ("period = 0.5", f"period = {10**400}", "components.a.start.period is a whole number of more than 64 bits"),
+        (
+            '["a.count", "b.count"]',
+            f'{{ from = "a.count", factor = {10**400} }}',
+            "connections.'sum.many'.factor is inf: give a finite number",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused_with_the_entry(old, new, sentence, folder):
