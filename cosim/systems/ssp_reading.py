@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -88,7 +89,7 @@ class _Reading:
     def _read_system(self, system: Any, path: str, units: Mapping[str, Measure]) -> None:
         """Note the components, wires and parameters of a system and of those in it; `path` is its name with a point."""
         self._read_connectors(system, path, units)
-        self._given |= {(path, name): value for name, value in self._parameters(system, path).items()}
+        self._given |= {(path, name): value for name, value in self._parameters(system, path, units).items()}
         paths = {None: path}
         for element in next(iter(_children(system, "Elements")), ()):
             name, kind = f"{path}{element.get('name')}", _local(element)
@@ -101,7 +102,7 @@ class _Reading:
                 self._read_system(element, f"{name}.", units)
             elif kind == "Component":
                 self._read_connectors(element, name, units)
-                self._elements[name], self._starts[name] = element, self._parameters(element, name)
+                self._elements[name], self._starts[name] = element, self._parameters(element, name, units)
             elif kind not in ("Annotations", ""):
                 raise self._misfit(f"it has a {kind} {name!r}, and components and systems alone are supported")
         for wire in _children_of(next(iter(_children(system, "Connections")), ()), "Connection"):
@@ -195,15 +196,19 @@ class _Reading:
         wire = Wire(node)
         return self._scaled(value, *self._ssp_units.along(("", ""), [wire], self._units.get(node)), node)
 
-    def _parameters(self, element: Any, place: str) -> dict[str, Any]:
+    def _parameters(self, element: Any, place: str, units: Mapping[str, Measure]) -> dict[str, Any]:
+        """Return start values; `units` are those of the file, which sets of parameters in it may use too."""
         values: dict[str, Any] = {}
         for binding in _children_of(next(iter(_children(element, "ParameterBindings")), ()), "ParameterBinding"):
             prefix = binding.get("prefix", "")
             if binding.get("source") is not None:
-                sets = [self._parsed(self._file(binding.get("source"), "parameters"))]
+                sets, around = [self._parsed(self._file(binding.get("source"), "parameters"))], {}
             else:
+                around = dict(units)
                 sets = [s for v in _children(binding, "ParameterValues") for s in _children(v, "ParameterSet")]
-            found = {name: value for one in sets for name, value in self._set(one, self._declared(one)).items()}
+            found = {
+                name: value for one in sets for name, value in self._set(one, around | self._declared(one)).items()
+            }
             mapping = self._mapping(binding)
             for name, (value, unit) in found.items():
                 same = prefix + name, 1.0, 0.0, True
@@ -222,6 +227,8 @@ class _Reading:
             is_array, name = bool(_children(parameter, "Dimension")), parameter.get("name", "")
             for typed in parameter:
                 listed, unit = [element.get("value") for element in _children(typed, "Value")], typed.get("unit")
+                if None in listed:
+                    raise self._misfit(f"its parameter {name!r} has a Value that gives none")
                 known = Unit(unit, units.get(unit)) if unit else None
                 if listed:
                     values[name] = listed if is_array else listed[0], known
@@ -237,6 +244,8 @@ class _Reading:
             for root in [self._parsed(self._file(source, "a mapping"))] if source is not None else inner:
                 for entry in _children(root, "MappingEntry"):
                     told = f"the mapping of {entry.get('source')}"
+                    if entry.get("target") is None:
+                        raise self._misfit(f"{told} has no target")
                     scale = self._scale(entry, told)
                     found[entry.get("source")] = entry.get("target"), *scale, not _suppressed(entry)
         return found
@@ -259,9 +268,12 @@ class _Reading:
 
     def _number(self, text: str, what: str) -> float:
         try:
-            return float(text)
+            number = float(text)
         except ValueError:
             raise self._misfit(f"{what} is {text!r}, which is no number") from None
+        if not math.isfinite(number):
+            raise self._misfit(f"{what} is {text!r}, which is not finite")
+        return number
 
     def _scaled(self, value: Any, factor: float, offset: float, node: Node) -> Any:
         if (factor, offset) == (1.0, 0.0):

@@ -120,7 +120,7 @@ class SspUnits:
         if place not in self._variables:
             self._variables[place] = _variables(self._file_of(place))
         known = self._variables[place]
-        return known.get(name) or known.get(name.partition("[")[0]) or (None, False)
+        return known.get(name) or known.get(name.partition("[")[0]) or _of_elements(known, name) or (None, False)
 
 
 def told(node: Node) -> str:
@@ -138,6 +138,11 @@ def measure_of(base: Mapping[str, Any]) -> Measure:
     """
     exponents = tuple(int(base.get(name) or 0) for name in BASE_UNITS)
     return Measure(exponents, float(base.get("factor") or 1.0), float(base.get("offset") or 0.0))
+
+
+def _of_elements(known: Mapping[str, tuple[Unit, bool]], array: str) -> tuple[Unit, bool] | None:
+    """Return the unit of an array that an FMU has as scalars, which FMI 2.0 asks for."""
+    return next((unit for name, unit in known.items() if name.startswith(f"{array}[")), None)
 
 
 def _then(line: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:

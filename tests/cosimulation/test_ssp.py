@@ -227,6 +227,10 @@ def test_automata_are_written_as_fmus_with_their_values_as_defaults(tmp_path, ca
             {"wires": WIRE.format('<ssc:LinearTransformation factor="two"/>')},
             "the factor of its connection .* is 'two'",
         ),
+        (
+            {"wires": WIRE.format('<ssc:LinearTransformation factor="nan"/>')},
+            "the factor of its connection .* is 'nan', which is not finite",
+        ),
         ({"more": '<ssd:Component name="a" source="resources/stranger.fmu"/>'}, "two of its components are called a"),
         ({"more": '<ssd:Component source="resources/stranger.fmu"/>'}, "it has a Component without a name"),
         ({"prefix": "<!DOCTYPE x [<!ENTITY e 'e'>]>"}, "SystemStructure.ssd has a DOCTYPE"),
@@ -331,6 +335,63 @@ def test_units_of_connectors_are_those_of_what_goes_over_them(suppressed, more, 
         path.write_text(CONNECTORS.format(out=unit, suppressed=suppressed, more=more))
         with pytest.raises(MisfitError, match=rf"a\.y is given in 'm', but its connector is in '{unit}', and {why}"):
             read_system(path.parent)
+
+
+ARRAYS = """<ssd:SystemStructureDescription version="2.0" name="units"
+    xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"
+    xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">
+  <ssd:System name="top"><ssd:Elements>
+    <ssd:Component name="a" source="a.fmu"><ssd:Connectors><ssd:Connector name="y" kind="output">
+      <ssc:Float64 unit="cm"/><ssc:Dimension size="2"/></ssd:Connector></ssd:Connectors>
+      <ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="2.0" name="p">
+        <ssv:Parameters><ssv:Parameter name="heights"><ssv:Float64 unit="cm">{values}</ssv:Float64>
+        <ssv:Dimension size="2"/></ssv:Parameter></ssv:Parameters>
+      </ssv:ParameterSet></ssd:ParameterValues>{mapping}</ssd:ParameterBinding></ssd:ParameterBindings></ssd:Component>
+    <ssd:Component name="b" source="b.fmu"/>
+  </ssd:Elements><ssd:Connections>
+    <ssd:Connection startElement="a" startConnector="y" endElement="b" endConnector="u"/>
+  </ssd:Connections></ssd:System>
+  <ssd:Units><ssc:Unit name="cm"><ssc:BaseUnit m="1" factor="0.01"/></ssc:Unit></ssd:Units>
+</ssd:SystemStructureDescription>"""
+TWO = '<ssv:Value value="250"/><ssv:Value value="300"/>'
+
+
+class ManyMetres(hm.HybridAutomaton):
+    heights = hm.Parameter([1.0, 2.0], unit="m")
+    y = hm.Output(unit="m", shape=2)
+
+    def outputs(self, s):
+        return {"y": s.heights}
+
+
+class ManyMillimetres(hm.HybridAutomaton):
+    u = hm.Input([0.0, 0.0], unit="mm")
+    y = hm.Output(unit="mm", shape=2)
+
+    def outputs(self, s):
+        return {"y": s.u}
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_units_of_arrays_are_those_of_their_elements(fmi, tmp_path, exported):
+    """Cm in a set of parameters, whose unit its file declares, are m in the FMU, cm at its connector, and then mm."""
+    shutil.copy(exported(ManyMetres(), "many-metres", fmi), tmp_path / "a.fmu")
+    shutil.copy(exported(ManyMillimetres(), "many-millimetres", fmi), tmp_path / "b.fmu")
+    path = tmp_path / "SystemStructure.ssd"
+    path.write_text(ARRAYS.format(values=TWO, mapping=""))
+    final = run_fixed_step(assemble(read_system(tmp_path)), 1.0, 0.5).final
+    assert [final["b.y[1]"], final["b.y[2]"]] == pytest.approx([2500.0, 3000.0])
+    entry = (
+        '<ssd:ParameterMapping><ssm:ParameterMapping xmlns:ssm="x" version="1.0"><ssm:MappingEntry source="heights"/>'
+        "</ssm:ParameterMapping></ssd:ParameterMapping>"
+    )
+    path.write_text(ARRAYS.format(values=TWO, mapping=entry))
+    with pytest.raises(MisfitError, match="the mapping of heights has no target"):
+        read_system(tmp_path)
+    path.write_text(ARRAYS.format(values=TWO.replace(' value="250"', ""), mapping=""))
+    with pytest.raises(MisfitError, match="its parameter 'heights' has a Value that gives none"):
+        read_system(tmp_path)
 
 
 def test_units_of_parameters_are_not_looked_at_where_a_mapping_suppresses_it(by_hand, tmp_path):
