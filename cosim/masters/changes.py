@@ -84,9 +84,9 @@ class Changes:
         self.follow(t)
         return set(changed)
 
-    def follow(self, t: float) -> None:
-        """Set the curves to their values at `t` in s."""
-        self.set(self._curves, t)
+    def follow(self, t: float, *, before: bool = False) -> None:
+        """Set the curves to their values at `t` in s, behind a jump there or before it."""
+        self.set(self._curves, math.nextafter(t, -math.inf) if before else t)
 
     @property
     def followed(self) -> list[str]:

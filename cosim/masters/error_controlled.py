@@ -308,6 +308,8 @@ class _Run:
         if self._at_one_time > AT_ONE_TIME:
             raise CosimError(f"{' and '.join(sorted(due))} gets no further than t = {t:.12g} s.")
         result.t = t
+        if self._rows and self._changes.next_time(t) is not None and (not result.times or result.times[-1] < t):
+            self.macro.exchange(t, before=True)
         self._row(t)
         for name in due:
             self.macro.near.pop(name, None)

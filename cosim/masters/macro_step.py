@@ -157,20 +157,20 @@ class MacroSteps:
                     found[k] = slope * (self._flows[k].factor if k < len(self._flows) else 1.0)
         return found
 
-    def exchange(self, t: float) -> list[float]:
-        """Carry the continuous signals to their inputs at `t` in s, and return them.
+    def exchange(self, t: float, *, before: bool = False) -> list[float]:
+        """Carry the continuous signals to their inputs at `t` in s, and return them; curves `before` they jump there.
 
         Raises
         ------
         CosimError
             If they do not settle: outputs depend on inputs at once, in a loop.
         """
-        self._changes.follow(t)
-        settling, before = Settling(self._system, self._flows, t), self._carried()
-        self._send(before, [None] * len(before))
-        while not settling.is_done(before, values := self._carried()):
-            self._send(values, before)
-            before = values
+        self._changes.follow(t, before=before)
+        settling, sent = Settling(self._system, self._flows, t), self._carried()
+        self._send(sent, [None] * len(sent))
+        while not settling.is_done(sent, values := self._carried()):
+            self._send(values, sent)
+            sent = values
         return values
 
     def _carried(self) -> list[float]:

@@ -309,3 +309,11 @@ def test_signals_that_rise_from_zero_get_on(power, kind, most):
     # Each step is within 1e-6 of the largest value so far, and there are some hundred times as many in one e.
     assert result.final["x.x"] == pytest.approx(1.0 / (power + 1.0), rel=1e-4)
     assert result.steps < most
+
+
+@pytest.mark.parametrize("kind", ["automaton", "2.0", "3.0"])
+def test_jumps_of_curves_have_both_rows(kind, fmus):
+    slave = AutomatonSlave("wire", Passes()) if kind == "automaton" else FmuSlave("wire", fmus("wire", kind))
+    line = Curve(lambda t: t if t < 0.5 else 3.0 - t, [0.5])
+    result = run_error_controlled(System([slave]), 1.0, output_interval=0.4, inputs={"wire.u": line})
+    assert _rows(result, 0.5, "wire.y") == pytest.approx([0.5, 2.5], abs=1e-9)
