@@ -1,6 +1,7 @@
 """Rolled maps compute what straight lines compute, to the last bit, in code whose length does not grow with a hub."""
 
 import ctypes
+import itertools
 import subprocess
 
 import casadi as ca
@@ -59,22 +60,20 @@ def program(name, inner):
     return ca.Function(f"hybrid_{name}", [x, y], [ca.densify(inner(x, y)), x[1] * y])
 
 
-@pytest.fixture(scope="module")
-def both(tmp_path_factory):
-    """All maps in one library: rolled, and as straight lines."""
-    given = [program(f"map{k}", inner) for k, inner in enumerate(MAPS.values())]
+def libraries_of(given, folder):
+    """All maps in one library: rolled, and as straight lines; and the work array that the first needs."""
     definitions = c_text.functions("model", given)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(c_text, "rolled", lambda body: None)
         straight = c_text.functions("model", given)
-    assert definitions.text.count("for (casadi_int") >= len(MAPS)
-    names = [f"map{k}" for k in range(len(MAPS))]
+    assert definitions.text.count("for (casadi_int") >= len(given)
+    names = [f"map{k}" for k in range(len(given))]
     files = {"rolled": definitions.text, "straight": straight.text}
     libraries = {}
     for which, text in files.items():
         text = text.replace("hybrid_map", f"{which}_hybrid_map")
         wrappers = "".join(_EXPORTED % {"name": name, "which": which} for name in names)
-        file = tmp_path_factory.mktemp("maps") / f"{which}.c"
+        file = folder / f"{which}.c"
         file.write_text(text + wrappers)
         # Thousands of straight lines take seconds to optimise, which changes no value.
         flags = ["-std=c99", "-fPIC", "-shared", "-ffp-contract=off", "-O1" if which == "rolled" else "-O0"]
@@ -82,6 +81,12 @@ def both(tmp_path_factory):
         subprocess.run([*find_compiler(), *flags, str(file), "-o", str(library), "-lm"], check=True)
         libraries[which] = ctypes.CDLL(str(library))
     return libraries, definitions.work[-1], given
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    given = [program(f"map{k}", inner) for k, inner in enumerate(MAPS.values())]
+    return libraries_of(given, tmp_path_factory.mktemp("maps"))
 
 
 def called(function, arguments, results, work):
@@ -93,11 +98,8 @@ def called(function, arguments, results, work):
     assert scratch[work] == -7.0
 
 
-@pytest.mark.parametrize("name", MAPS)
-def test_loops_compute_what_straight_lines_compute_to_the_last_bit(both, name):
-    libraries, work, given = both
-    number = list(MAPS).index(name)
-    generator = np.random.default_rng(number)
+def assert_the_same_bits(libraries, work, given, number, seed):
+    generator = np.random.default_rng(seed)
     for _ in range(3):
         arguments = [generator.uniform(-2.0, 2.0, SIZE) for _ in range(2)]
         found = {}
@@ -106,7 +108,53 @@ def test_loops_compute_what_straight_lines_compute_to_the_last_bit(both, name):
             called(getattr(library, f"map{number}_{which}"), arguments, results, work)
             found[which] = np.concatenate(results)
         assert found["rolled"].tobytes() == found["straight"].tobytes()
-        assert np.isfinite(found["rolled"]).all()
+    return found["rolled"]
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_loops_compute_what_straight_lines_compute_to_the_last_bit(both, name):
+    number = list(MAPS).index(name)
+    assert np.isfinite(assert_the_same_bits(*both, number, number)).all()
+
+
+ONE = (ca.sin, ca.fabs, ca.floor, lambda a: -a, lambda a: a * a, lambda a: 1.0 / (a + 3.0))
+TWO = (
+    *(lambda a, b: a + b, lambda a, b: a - b, lambda a, b: a * b, ca.fmin, ca.atan2),
+    lambda a, b: ca.if_else(a > b, a, 0.5 * b),
+)
+
+
+WAYS = (
+    lambda random, a, b, total: list(map(ONE[random.integers(len(ONE))], a)),
+    lambda random, a, b, total: list(map(TWO[random.integers(len(TWO))], a, b)),
+    lambda random, a, b, total: list(map(TWO[random.integers(len(TWO))], a, [total] * SIZE)),
+    lambda random, a, b, total: [a[k] for k in random.permutation(SIZE).tolist()],
+    lambda random, a, b, total: [float(c) * v for c, v in zip(random.normal(size=SIZE).round(2), a, strict=True)],
+    lambda random, a, b, total: [*(w - v for v, w in itertools.pairwise(a)), total],
+    lambda random, a, b, total: [a[0], *(0.3 * v - 0.2 * w for v, w in zip(a[:-1], b[1:], strict=True))],
+)
+"""Columns made of columns."""
+
+
+def random_map(random):
+    def inner(x, y):
+        columns, sums = [ca.vertsplit(x), ca.vertsplit(y)], [y[0]]
+        for _ in range(random.integers(4, 9)):
+            a, b = (columns[random.integers(len(columns))] for _ in range(2))
+            columns.append(WAYS[random.integers(len(WAYS))](random, a, b, sums[random.integers(len(sums))]))
+            sums.append(chain(TWO[random.integers(len(TWO))], columns[-1]))
+        return ca.vertcat(*columns[-1], *columns[random.integers(len(columns))], *sums)
+
+    return inner
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(4))
+def test_random_maps_compute_the_same_bits(seed, tmp_path):
+    random = np.random.default_rng(seed)
+    found = libraries_of([program(f"map{k}", random_map(random)) for k in range(8)], tmp_path)
+    for number in range(8):
+        assert_the_same_bits(*found, number, number)
 
 
 def test_arguments_and_results_that_are_not_there_are_zeros_and_not_wanted(both):
