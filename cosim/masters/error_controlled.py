@@ -178,9 +178,9 @@ class _Run:
         """Go on to `limit` in s, or to the end of the run."""
         result = self._result
         for _ in range(MOST_STEPS):
-            if self.ended or result.t >= limit:
+            due = None if self.ended else self._changes.next_time(limit)
+            if self.ended or (due is None and result.t >= limit):
                 return
-            due = self._changes.next_time(limit)
             goal = limit if due is None else max(due, result.t)
             if goal > result.t + (0.0 if due is None else self._resolution):
                 self._step(min(goal, self._until, *self.macro.announced.values()))

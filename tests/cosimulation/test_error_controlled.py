@@ -317,3 +317,14 @@ def test_jumps_of_curves_have_both_rows(kind, fmus):
     line = Curve(lambda t: t if t < 0.5 else 3.0 - t, [0.5])
     result = run_error_controlled(System([slave]), 1.0, output_interval=0.4, inputs={"wire.u": line})
     assert _rows(result, 0.5, "wire.y") == pytest.approx([0.5, 2.5], abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["automaton", "2.0", "3.0"])
+def test_what_is_read_where_a_signal_changes_is_behind_the_change(kind, fmus):
+    """At an output point, and at the end."""
+    slave = AutomatonSlave("wire", Passes()) if kind == "automaton" else FmuSlave("wire", fmus("wire", kind))
+    steps = hm.Signal(lambda t: np.floor(2.0 * t), [0.5, 1.0])
+    inputs = {"wire.u": steps}
+    result = run_error_controlled(System([slave]), 1.0, output_interval=0.5, record_events=False, inputs=inputs)
+    assert result.signals["wire.y"] == [0.0, 1.0, 2.0]
+    assert result.final["wire.y"] == 2.0
