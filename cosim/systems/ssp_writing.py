@@ -63,7 +63,7 @@ def write_osp(definition: SystemDefinition, system: System, folder: str | Path, 
     Raises
     ------
     MisfitError
-        If a component is no FMU.
+        If a component is no FMU, or a connection scales what it carries or converts its unit.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -83,9 +83,11 @@ def write_osp(definition: SystemDefinition, system: System, folder: str | Path, 
                 _add(initial, OSP, kind, value=_text(value))
     connections = _add(root, OSP, "Connections")
     for wire in system.connections:
-        linear = _linear(definition, f"{wire.target}.{wire.input}")
-        if linear is not None and (linear.factor, linear.offset) != (1.0, 0.0):
-            raise MisfitError(f"{wire} is scaled, which is not written for libcosim: scale in one of the FMUs.")
+        if wire.converts:
+            raise MisfitError(
+                f"{wire} is scaled, or converted to another unit, which is not written for libcosim: do so in one of "
+                "the FMUs."
+            )
         element = _add(connections, OSP, "VariableConnection")
         _add(element, OSP, "Variable", simulator=wire.source, name=wire.output)
         _add(element, OSP, "Variable", simulator=wire.target, name=wire.input)

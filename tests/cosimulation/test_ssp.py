@@ -179,7 +179,9 @@ def test_signals_are_scaled_and_written_as_they_are(tmp_path, exported):
     for given in (tmp_path, path):
         # b's input is 10 * 5 + 1.
         assert run_fixed_step(assemble(read_system(given)), 1.0, 0.5).final["b.y"] == pytest.approx(153.0)
-    with pytest.raises(MisfitError, match=r"a.y -> b.u is scaled, which is not written for libcosim"):
+    with pytest.raises(
+        MisfitError, match=r"a.y -> b.u is scaled, or converted to another unit, which is not written for libcosim"
+    ):
         write_osp(definition, assemble(definition), tmp_path / "osp", 0.1)
 
 
@@ -292,6 +294,11 @@ def test_units_are_converted_unless_a_connection_suppresses_it(suppressed, tmp_p
     again = read_ssp(path)
     assert again.connections == {"b.u": source}
     assert run_fixed_step(assemble(again), 1.0, 0.5).final["b.y"] == (2.0 if suppressed else 2000.0)
+    if suppressed:
+        write_osp(definition, assemble(definition), tmp_path / "osp", 0.1)
+    else:
+        with pytest.raises(MisfitError, match=r"a.y -> b.u is scaled, or converted to another unit"):
+            write_osp(definition, assemble(definition), tmp_path / "osp", 0.1)
 
 
 CONNECTORS = """<ssd:SystemStructureDescription version="2.0" name="units"
