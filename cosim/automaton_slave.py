@@ -87,6 +87,7 @@ class AutomatonSlave(Slave):
         self._solver, self._engine = solver or Solver(), engine
         self._whole = {e for v in automaton.variables if v.integer for e in element_names(v)}
         self._ranges = {e: (v.minimum, v.maximum) for v in automaton.variables for e in element_names(v)}
+        self._computed = set(layout.names(Kind.OUTPUT))
         self._names = [element for kind in Kind for element in layout.names(kind)]
         self._predictable = all(port.discrete for port in ports[Kind.INPUT])
         self.starts: dict[str, float] = {}
@@ -105,6 +106,11 @@ class AutomatonSlave(Slave):
         """See `Slave.set`."""
         if name not in self._names:
             raise self.unknown(name)
+        if name in self._computed:
+            raise MisfitError(
+                f"{self.name}.{name} is an output that the automaton computes: set what it is computed from, its "
+                "parameters, inputs and states."
+            )
         if isinstance(value, (str, bytes)):
             raise MisfitError(f"{self.name}.{name} is set to {value!r}: set a number.")
         if not np.isfinite(value):

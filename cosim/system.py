@@ -314,9 +314,10 @@ class System:
 
     def _elements(self, target: str, sources: str | Sequence[str]) -> list[tuple[str, str]]:
         """Return the elements of an input with the outputs they are connected to."""
-        if not isinstance(sources, str):
-            return [(f"{target}[{k}]", source) for k, source in enumerate(sources, start=1)]
         places = self._places(target, "input")
+        if not isinstance(sources, str):
+            self._require_one_each(target, places, sources)
+            return [(target + place, source) for place, source in zip(places, sources, strict=True)]
         given = self._places(sources, "output")
         if not places and not given:
             return [(target, sources)]
@@ -326,6 +327,19 @@ class System:
                 "the output of each element in a list."
             )
         return [(target + place, sources + place) for place in places]
+
+    def _require_one_each(self, target: str, places: Sequence[str], sources: Sequence[str]) -> None:
+        """Refuse a list of outputs that is not one for each element: those left out would stand still unnoticed."""
+        given = f"a list of {len(sources)} output{'s' * (len(sources) != 1)}"
+        if not places:
+            self._find(target, "input")
+            raise MisfitError(f"{target} is no array, but is given {given}: name one output, not in a list.")
+        if len(places) == len(sources):
+            return
+        raise MisfitError(
+            f"{target} has {len(places)} elements, {places[0]} to {places[-1]}, but is given {given}: name one for "
+            f'each element, or drive single ones, as "{target}{places[0]}".'
+        )
 
     def _places(self, scoped: str, what: str) -> list[str]:
         """Return the places of an array's elements, ``[1]``, in order; none for a scalar."""

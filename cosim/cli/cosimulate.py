@@ -8,20 +8,19 @@ import json
 import math
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 from cosim.cli.exits import Exit, exit_of, given_values
-from cosim.cli.options.cosimulate import ERROR_CONTROLLED, EVENT_EXACT, FIXED_STEP, MASTERS
 from cosim.cli.outputs import results_folder
 from cosim.cli.progress import Work
 from cosim.cli.run_files import RunFiles
 from cosim.cli.step_study import study
 from cosim.cli.system_fmus import with_fmus
 from cosim.consensus import fmu_system
-from cosim.errors import CosimError, MisfitError, UsageError
+from cosim.errors import CosimError, MisfitError, TimesError, UsageError
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
 from cosim.masters.error_controlled import TOLERANCE
@@ -30,7 +29,16 @@ from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
 from cosim.systems.assembly import assemble, sizes_first
-from cosim.systems.definition import AUTOMATON, FMU, Component, Experiment, SystemDefinition
+from cosim.systems.definition import (
+    AUTOMATON,
+    ERROR_CONTROLLED,
+    EVENT_EXACT,
+    FIXED_STEP,
+    FMU,
+    Component,
+    Experiment,
+    SystemDefinition,
+)
 from cosim.systems.files import read_system
 from cosim.systems.ssp_writing import write_osp, write_ssp
 from cosim.tables.input_table import read_inputs
@@ -64,28 +72,48 @@ def run(options: argparse.Namespace) -> int:
             scenario = load_scenario(options.system)
             if options.step_study is not None:
                 return _study(scenario, options)
+            _require_fmus(options, [])
             system, experiment = _agents(scenario, folder, options.fmi), Experiment(stop_time=scenario.stop_time)
             _set_starts(system.slaves, starts)
             fmus = [Component(name, FMU, str(folder / f"{name}.fmu")) for name in system.slaves]
             definition = SystemDefinition(scenario.name, fmus, broadcast_wires(scenario))
         else:
-            if options.interface is not None:
-                definition = replace(
-                    definition,
-                    components=[replace(c, interface=c.interface or options.interface) for c in definition.components],
-                )
+            definition = _with_interface(definition, options)
             system, experiment = _assembled(definition, options, starts), definition.experiment
             options.input_file = options.input_file or definition.inputs
         if options.save_as is not None:
             return _save(options, definition, system, _completed(options, system, experiment), folder)
-        return _run(system, options, _completed(options, system, experiment))
+        with _slips_in_times(options, experiment):
+            return _run(system, options, _completed(options, system, experiment))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def _described(options: argparse.Namespace) -> SystemDefinition | None:
     with _slips_of(options):
-        return read_system(options.system)
+        definition = read_system(options.system)
+    if definition is not None and definition.left_out:
+        told = f"{options.system} gives values to what is not in it, and they are left out"
+        print(f"hybrid-fmu: {told}: {_some(list(definition.left_out))}.", file=sys.stderr)
+    return definition
+
+
+def _with_interface(definition: SystemDefinition, options: argparse.Namespace) -> SystemDefinition:
+    """Return the system with the interface that is wished for the FMUs whose file names none."""
+    _require_fmus(options, definition.components)
+    if options.interface is None:
+        return definition
+    chosen = {c.name: c.interface or options.interface for c in definition.components if c.kind == FMU}
+    return replace(definition, components=[replace(c, interface=chosen.get(c.name)) for c in definition.components])
+
+
+def _require_fmus(options: argparse.Namespace, components: Sequence[Component]) -> None:
+    """Refuse an interface where there is no FMU that is used by one."""
+    if options.interface is not None and not any(component.kind == FMU for component in components):
+        raise UsageError(
+            f"--interface {options.interface} chooses what is used of FMUs, and {options.system} names none: leave it "
+            "out."
+        )
 
 
 def _assembled(definition: SystemDefinition, options: argparse.Namespace, starts: dict[str, str]) -> System:
@@ -119,6 +147,20 @@ def _slips_in_tables() -> Iterator[None]:
         yield
     except MisfitError as error:
         raise UsageError(str(error)) from error
+
+
+@contextlib.contextmanager
+def _slips_in_times(options: argparse.Namespace, file: Experiment) -> Iterator[None]:
+    """Let times that were given, and do not fit, be wrong usage; those that an FMU proposes are its own matter."""
+    try:
+        yield
+    except TimesError as error:
+        for name in error.of:
+            if getattr(options, name, None) is not None:
+                raise UsageError(f"--{name.replace('_', '-')}: {error}") from error
+            if getattr(file, name) is not None:
+                raise UsageError(f"{options.system}, {name}: {error}") from error
+        raise
 
 
 def _save(
@@ -240,8 +282,6 @@ def _master(
     curves = any(isinstance(given, Curve) for given in inputs.values())
     flows = any(system.is_continuous(connection) for connection in system.connections)
     exact = not curves and not flows and all(slave.has_event_mode and slave.variable_step for slave in slaves)
-    if experiment.master not in (None, *MASTERS):
-        raise UsageError(f"the master {experiment.master!r} is none of {', '.join(MASTERS)}.")
     able = all(slave.can_restore and slave.variable_step and slave.internal_step is None for slave in slaves)
     controlled = able and bool(system.connections)
     master = experiment.master or (EVENT_EXACT if exact else ERROR_CONTROLLED if controlled else FIXED_STEP)

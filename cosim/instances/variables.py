@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.errors import CosimError
 from cosim.measure import Measure
 from cosim.slave import Port
 from fmu.standard.units import BASE_UNITS
@@ -30,14 +31,19 @@ class FmuVariables:
     ----------
     places : dict
         Name of a scalar -> its variable, and its place among the variable's elements.
+
+    Raises
+    ------
+    CosimError
+        If a unit or a size is no number, in a description that was not held against the schema.
     """
 
     def __init__(self, description: Any) -> None:
-        self._measures = {unit.name: _measure(unit.baseUnit) for unit in description.unitDefinitions or ()}
+        self._measures = {unit.name: _measure(unit) for unit in description.unitDefinitions or ()}
         self._variables = [variable for variable in description.modelVariables if variable.type in TYPES]
         # Arrays have the sizes that structural parameters say.
         self._sizes = {
-            v.valueReference: int(v.start)
+            v.valueReference: _size(v)
             for v in self._variables
             if v.causality == STRUCTURAL and v.type in INTEGERS and v.start
         }
@@ -152,8 +158,24 @@ def _nominal(text: str | None) -> float:
     return size if math.isfinite(size) else 0.0
 
 
-def _measure(base: Any) -> Measure | None:
+def _measure(unit: Any) -> Measure | None:
+    base = unit.baseUnit
     if base is None:
         return None
-    exponents = tuple(int(getattr(base, name) or 0) for name in BASE_UNITS)
-    return Measure(exponents, float(base.factor or 1.0), float(base.offset or 0.0))
+    try:
+        exponents = tuple(int(getattr(base, name) or 0) for name in BASE_UNITS)
+        return Measure(exponents, float(base.factor or 1.0), float(base.offset or 0.0))
+    except ValueError as error:
+        raise CosimError(
+            f"the BaseUnit of the unit {unit.name!r} is none, {error}: correct the description."
+        ) from error
+
+
+def _size(parameter: Any) -> int:
+    try:
+        return int(parameter.start)
+    except ValueError as error:
+        raise CosimError(
+            f"{parameter.name}, a size, starts at {parameter.start!r}, which is no whole number: correct the "
+            "description."
+        ) from error

@@ -7,13 +7,21 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from cosim.errors import CosimError, MisfitError
+from cosim.errors import CosimError, MisfitError, TimesError
 from cosim.feedthrough import refuse_loops
 from cosim.masters.changes import Changes, Given
 from cosim.masters.event_iteration import Handled, iterate_events
 from cosim.masters.macro_step import SEEN, MacroSteps, Outcome, States
 from cosim.masters.signal_sizes import SignalSizes
-from cosim.masters.start import MOST_STEPS, outputs, require_times, sample_change, sample_end, start_slaves
+from cosim.masters.start import (
+    INTERVAL,
+    MOST_STEPS,
+    outputs,
+    require_times,
+    sample_change,
+    sample_end,
+    start_slaves,
+)
 from cosim.masters.treatments import with_rollback
 from cosim.replayed_slave import ReplayedSlave
 from cosim.result import CosimResult, Watch
@@ -90,13 +98,15 @@ def run_error_controlled(
     ------
     MisfitError
         If a slave takes steps of one length only.
+    TimesError
+        If the times or the tolerance make no sense.
     CosimError
         If a slave fails, gets no further, or the signals between slaves form a loop without a state.
     """
     require_system("run_error_controlled", system)
-    require_times(t_start, t_stop, output_interval, "output interval")
+    require_times(t_start, t_stop, output_interval, INTERVAL)
     if not 0.0 < tolerance < 1.0:
-        raise CosimError(f"the tolerance is {tolerance}: give a number between 0 and 1, such as 1e-9.")
+        raise TimesError(f"the tolerance is {tolerance}: give a number between 0 and 1, such as 1e-9.", "tolerance")
     refuse_loops(system)
     system = _with_rollback(system)
     changes = Changes(system, inputs or {}, t_start)

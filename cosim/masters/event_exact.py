@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING
 from cosim.errors import CosimError, MisfitError
 from cosim.masters.changes import Changes, Curve, Given
 from cosim.masters.queues import queue_of
-from cosim.masters.start import apart_from_the_rest, outputs, require_times, sample_change, sample_end, start_slaves
+from cosim.masters.start import (
+    INTERVAL,
+    apart_from_the_rest,
+    outputs,
+    require_times,
+    sample_change,
+    sample_end,
+    start_slaves,
+)
 from cosim.masters.treatments import exactly
 from cosim.result import CosimResult, Watch
 from cosim.system import System, require_system
@@ -69,7 +77,7 @@ def run_event_exact(
         If a slave fails, or asks for event iterations without end.
     """
     require_system("run_event_exact", system)
-    require_times(t_start, t_stop, output_interval, "output interval")
+    require_times(t_start, t_stop, output_interval, INTERVAL)
     _require_discrete(system)
     _refuse_curves(inputs or {})
     told = 0

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from cosim.errors import CosimError, MisfitError
+from cosim.errors import CosimError, TimesError
 from cosim.masters.changes import Changes, Given
 from cosim.masters.loops import Settling
-from cosim.masters.start import outputs, require_times, sample_end, start_slaves
+from cosim.masters.start import INTERVAL, STEP, outputs, require_times, sample_end, start_slaves
 from cosim.masters.treatments import by_fixed_steps
 from cosim.result import CosimResult, Watch
 from cosim.rounds import Ending, stepping_round
@@ -70,13 +70,15 @@ def run_fixed_step(
     Raises
     ------
     CosimError
-        If a slave fails or the times make no sense.
+        If a slave fails.
+    TimesError
+        If the times make no sense, or the last step is shorter, and a slave takes steps of one length only.
     MisfitError
-        If the last step is shorter, and a slave takes steps of one length only, or if a name of `inputs` cannot be set.
+        If a name of `inputs` cannot be set.
     """
     require_system("run_fixed_step", system)
-    require_times(t_start, t_stop, step, "communication step")
-    require_times(t_start, t_stop, output_interval, "output interval")
+    require_times(t_start, t_stop, step, STEP)
+    require_times(t_start, t_stop, output_interval, INTERVAL)
     if isinstance(record, (bool, str)):
         raise CosimError(f"record is {record!r}: give a list of outputs, for all of them system.output_names.")
     count = math.ceil((t_stop - t_start) / step * (1.0 - 1e-14))
@@ -199,17 +201,22 @@ def _require_constant(system: System, length: float, count: int, step: float) ->
     """Refuse a shorter last step if a slave takes steps of one length only."""
     rigid = next((name for name, slave in system.slaves.items() if not slave.variable_step), None)
     if rigid is not None and abs(length - count * step) > ROUNDING * length:
-        raise MisfitError(
+        raise TimesError(
             f"{rigid} takes steps of one length only (canHandleVariableCommunicationStepSize is false), but a run of "
             f"{length:.9g} s is no multiple of {step:.9g} s: end it {(count - 1) * step:.9g} or {count * step:.9g} s "
-            "after its start, or choose another step."
+            "after its start, or choose another step.",
+            "stop_time",
+            "step_size",
+            "start_time",
         )
 
 
 def _steps_between(interval: float, step: float) -> int:
     every = round(interval / step)
     if every < 1 or abs(every * step - interval) > ROUNDING * interval:
-        raise CosimError(
-            f"the output interval is {interval} s, which is no multiple of the communication step, {step} s: give one."
+        raise TimesError(
+            f"the output interval is {interval} s, which is no multiple of the communication step, {step} s: give one.",
+            "output_interval",
+            "step_size",
         )
     return every

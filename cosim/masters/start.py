@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from cosim.errors import CosimError
+from cosim.errors import CosimError, TimesError
 from cosim.feedthrough import in_order
 from cosim.masters.changes import Changes
 from cosim.masters.loops import Settling
@@ -18,6 +18,8 @@ from hybrid_model.declare.real_numbers import is_real
 
 MOST_STEPS = 100_000_000
 """Most steps of one run."""
+STEP, INTERVAL = "communication step", "output interval"
+"""What messages call the lengths of a run that are chosen."""
 GROWTH = 1.5
 """By so much what the process holds may grow from run to run before it is looked through for garbage."""
 
@@ -28,25 +30,36 @@ def require_times(t_start: float, t_stop: float, interval: float | None, what: s
     Raises
     ------
     CosimError
+        If one is no number.
+    TimesError
         With the value and the rule.
     """
+    of = "step_size" if what == STEP else "output_interval"
     for value in (t_start, t_stop, 0.0 if interval is None else interval):
         if not is_real(value):
             raise CosimError(f"{value!r} is no time: give a number of seconds.")
     if not (math.isfinite(t_start) and math.isfinite(t_stop) and t_stop > t_start):
-        raise CosimError(f"the run goes from {t_start} to {t_stop} s: give finite times, the stop after the start.")
+        raise TimesError(
+            f"the run goes from {t_start} to {t_stop} s: give finite times, the stop after the start.",
+            "stop_time",
+            "start_time",
+        )
     if interval is not None and not (math.isfinite(interval) and interval > 0):
-        raise CosimError(f"the {what} is {interval} s: give a positive, finite number.")
+        raise TimesError(f"the {what} is {interval} s: give a positive, finite number.", of)
     latest = max(abs(t_start), abs(t_stop))
     if interval is not None and interval < math.ulp(latest):
-        raise CosimError(
+        raise TimesError(
             f"the {what} is {interval} s, but floating-point numbers lie {math.ulp(latest):.3g} s apart at t = "
-            f"{latest:.9g} s: give a longer one."
+            f"{latest:.9g} s: give a longer one.",
+            of,
         )
     if interval is not None and (t_stop - t_start) / interval > MOST_STEPS:
-        raise CosimError(
+        raise TimesError(
             f"a {what} of {interval} s makes {(t_stop - t_start) / interval:.3g} steps from {t_start:.9g} to "
-            f"{t_stop:.9g} s, and at most {MOST_STEPS} are made: give a longer one."
+            f"{t_stop:.9g} s, and at most {MOST_STEPS} are made: give a longer one.",
+            of,
+            "stop_time",
+            "start_time",
         )
 
 

@@ -15,7 +15,7 @@ from cosim.system import System
 from cosim.systems.automaton_files import find_automaton
 from cosim.systems.definition import FMU, Component, SystemDefinition
 from cosim.systems.plugs import unplugged
-from fmu.importer.loading import read_description
+from fmu.importer.loading import UNREADABLE, read_description
 from hybrid_model.named_objects import imports_from
 
 
@@ -93,7 +93,7 @@ def _exchanges(component: Component) -> bool:
         return component.interface == "me"
     try:
         description = read_description(component.source, validate=False)
-    except Exception:  # noqa: BLE001 - whatever fmpy raises, the slave says what is wrong
+    except UNREADABLE:  # the slave says what is wrong
         return False
     return description.coSimulation is None and description.modelExchange is not None
 

@@ -10,6 +10,7 @@ from typing import Any
 from cosim.sources import Source
 
 FMU, AUTOMATON = "fmu", "automaton"
+EVENT_EXACT, ERROR_CONTROLLED, FIXED_STEP = MASTERS = "event-exact", "error-controlled", "fixed-step"
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,8 @@ class SystemDefinition:
     inputs : Path, optional
         A table of inputs that nothing drives.
     experiment : Experiment
+    left_out : sequence of str
+        Parameters that its file gives values, and that nothing in it has, which SSP allows.
     """
 
     name: str
@@ -80,3 +83,4 @@ class SystemDefinition:
     connections: Mapping[str, Source] = field(default_factory=dict)
     inputs: Path | None = None
     experiment: Experiment = field(default_factory=Experiment)
+    left_out: Sequence[str] = ()

@@ -12,7 +12,7 @@ from typing import Any
 
 from cosim.errors import MisfitError
 from cosim.sources import Linear, Source
-from cosim.systems.definition import AUTOMATON, FMU, Component, Experiment, SystemDefinition
+from cosim.systems.definition import AUTOMATON, FMU, MASTERS, Component, Experiment, SystemDefinition
 
 _TABLES = ("name", "experiment", "components", "connections", "inputs")
 _COMPONENT = (FMU, AUTOMATON, "start", "arguments", "interface")
@@ -89,6 +89,8 @@ def _source(path: Path, target: str, given: Any) -> Source:
 
 def _component(path: Path, folder: Path, name: str, entry: Any) -> Component:
     where = f"components.{name}"
+    if not name.strip():
+        raise MisfitError(f"{path}: a component is called {name!r}: give it a name, which connections begin with.")
     if not isinstance(entry, dict):
         raise MisfitError(f"{path}: {where} is {entry!r}: give a table.")
     _require_known(path, f"{where}.", entry, _COMPONENT)
@@ -103,6 +105,11 @@ def _component(path: Path, folder: Path, name: str, entry: Any) -> Component:
     interface = entry.get("interface")
     if interface is not None and interface not in INTERFACES:
         raise MisfitError(f"{path}: {where}.interface is {interface!r}: give one of {', '.join(INTERFACES)}.")
+    if interface is not None and kinds[0] == AUTOMATON:
+        raise MisfitError(
+            f"{path}: {where}.interface is {interface!r}, and an automaton runs in this process without one: leave it "
+            "out, or export the automaton and name its FMU."
+        )
     if kinds[0] == FMU:
         _require_file(path, f"{where}.fmu", Path(source))
     start, arguments = (_table(path, entry, key, f"{where}.") for key in ("start", "arguments"))
@@ -154,14 +161,27 @@ def _experiment(path: Path, entry: Mapping[str, Any]) -> Experiment:
     known = [field.name for field in fields(Experiment)]
     _require_known(path, "experiment.", entry, known)
     for name, value in entry.items():
-        if name == "master" and not isinstance(value, str):
-            raise MisfitError(f"{path}: experiment.master is {value!r}: give the name of one.")
+        if name == "master" and value not in MASTERS:
+            raise MisfitError(f"{path}: experiment.master is {value!r}: give one of {', '.join(MASTERS)}.")
         if name != "master" and not _is_number(value):
             raise MisfitError(f"{path}: experiment.{name} is {value!r}: give a number.")
     numbers: dict[str, Any] = {
         name: _finite(path, f"experiment.{name}", value) for name, value in entry.items() if name != "master"
     }
-    return Experiment(**numbers, master=entry.get("master"))
+    for name in ("step_size", "output_interval"):
+        if not numbers.get(name, 1.0) > 0.0:
+            raise MisfitError(f"{path}: experiment.{name} is {numbers[name]:g}: give seconds, more than 0.")
+    if not 0.0 < numbers.get("tolerance", 0.5) < 1.0:
+        raise MisfitError(
+            f"{path}: experiment.tolerance is {numbers['tolerance']:g}: give a number between 0 and 1, such as 1e-9."
+        )
+    experiment = Experiment(**numbers, master=entry.get("master"))
+    if experiment.stop_time is not None and not experiment.stop_time > (experiment.start_time or 0.0):
+        raise MisfitError(
+            f"{path}: experiment.stop_time is {experiment.stop_time:g}, and the run starts at "
+            f"{experiment.start_time or 0.0:g} s (experiment.start_time): give a stop after the start."
+        )
+    return experiment
 
 
 def _table(path: Path, document: Mapping[str, Any], name: str, prefix: str = "") -> dict[str, Any]:

@@ -38,6 +38,8 @@ class ArchiveLimits:
         Characters of a member's name.
     description : str
         The member that says what the archive is, and that it must have at its top.
+    kind, standard : str
+        What messages call such an archive, and what says how it is packed.
     """
 
     entries: int = 20_000
@@ -46,6 +48,8 @@ class ArchiveLimits:
     ratio_from: int = 16 << 20
     name_length: int = 1024
     description: str = DESCRIPTION
+    kind: str = "FMU"
+    standard: str = "FMI"
 
 
 LIMITS = ArchiveLimits()
@@ -66,10 +70,10 @@ def problems_of(archive: zipfile.ZipFile, limits: ArchiveLimits) -> Iterator[tup
     yield from _clashes(members)
     yield from _overlaps(members)
     if limits.description not in map(name_of, members):
-        what = "FMU" if limits.description == DESCRIPTION else "archive of its kind"
         yield (
             "description",
-            f"The archive has no {limits.description} at its top; every {what} has one: pack the folder's content.",
+            f"The archive has no {limits.description} at its top; every {limits.kind} has one: pack the folder's "
+            "content.",
         )
 
 
@@ -78,11 +82,12 @@ def _name_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator[t
     name = member.orig_filename.replace("\\", "/")  # `filename` is cut at a NUL and has the separators of this system
     parts = name.removesuffix("/").split("/")
     if name.startswith("/"):
-        yield "absolute", f"The member {shown} is an absolute path; an FMU stays within its folder."
+        yield "absolute", f"The member {shown} is an absolute path; an {limits.kind} stays within its folder."
     elif "" in parts or "." in parts:
         yield "path", f"The member {shown} has an empty or '.' part; give a plain relative path."
     if ".." in parts:
-        yield "traversal", f"The member {shown} leaves the FMU's folder by '..'; give a plain relative path."
+        folder = f"the {limits.kind}'s folder"
+        yield "traversal", f"The member {shown} leaves {folder} by '..'; give a plain relative path."
     if ":" in name:
         yield "drive", f"The member {shown} has a colon, which names a drive or stream on Windows; rename it."
     if any(unicodedata.category(c) in ("Cc", "Cs") for c in name):
@@ -100,13 +105,14 @@ def _member_problems(member: zipfile.ZipInfo, limits: ArchiveLimits) -> Iterator
     kind = stat.S_IFMT(member.external_attr >> 16)
     if kind not in (0, stat.S_IFREG, stat.S_IFDIR):
         what = "a symbolic link" if kind == stat.S_IFLNK else "a special file"
-        yield "link", f"The member {shown} is {what}; an FMU holds plain files: put the file itself there."
+        yield "link", f"The member {shown} is {what}; an {limits.kind} holds plain files: put the file itself there."
     if member.flag_bits & ENCRYPTED:
-        yield "encrypted", f"The member {shown} is encrypted, which FMI forbids; pack it in plain."
+        yield "encrypted", f"The member {shown} is encrypted, which {limits.standard} forbids; pack it in plain."
     if member.compress_type not in (STORED, DEFLATED):
         yield (
             "compression",
-            f"The member {shown} has compression method {member.compress_type}; FMI allows 0 (store) and 8 (deflate).",
+            f"The member {shown} has compression method {member.compress_type}; {limits.standard} allows 0 (store) and "
+            "8 (deflate).",
         )
     if is_folder(member) and member.file_size:
         yield "folder", f"The folder {shown} holds {member.file_size} bytes; a folder holds none."

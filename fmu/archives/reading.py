@@ -53,7 +53,7 @@ class Archive:
     Parameters
     ----------
     path : str or Path
-        The FMU.
+        The FMU, or another archive that `limits` say.
     limits : ArchiveLimits
 
     Attributes
@@ -72,9 +72,10 @@ class Archive:
     """
 
     def __init__(self, path: str | Path, limits: ArchiveLimits = LIMITS) -> None:
+        self._kind = limits.kind
         self._file: IO[bytes] = Path(path).open("rb")  # noqa: SIM115 - `__exit__` closes it
         try:
-            self._zip = _opened(self._file)
+            self._zip = _opened(self._file, limits.kind)
             problems = tuple(problems_of(self._zip, limits)) or tuple(self._differences())
             if problems:
                 raise ArchiveError(problems)
@@ -167,14 +168,14 @@ class Archive:
                     yield chunk
         except BROKEN as error:
             raise ArchiveError(
-                (("damaged", f"The member {name!r} is damaged: {error}. Pack the FMU anew."),)
+                (("damaged", f"The member {name!r} is damaged: {error}. Pack the {self._kind} anew."),)
             ) from error
 
 
-def _opened(file: IO[bytes]) -> zipfile.ZipFile:
+def _opened(file: IO[bytes], kind: str) -> zipfile.ZipFile:
     try:
         return zipfile.ZipFile(file)
     except BROKEN as error:
         raise ArchiveError(
-            (("zip", f"The file is not a readable ZIP archive: {error}. Pack the FMU anew."),)
+            (("zip", f"The file is not a readable ZIP archive: {error}. Pack the {kind} anew."),)
         ) from error

@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from fmpy import platform, platform_tuple, read_model_description, sharedLibraryExtension
+from fmpy.model_description import ValidationError
 from lxml import etree
 
-from fmu.archives.reading import Archive
-from fmu.importer.plain_xml import require_plain
+from fmu.archives.reading import Archive, ArchiveError
+from fmu.importer.plain_xml import PlainXmlError, require_plain
 
 Fmu = TypeVar("Fmu")
 DESCRIPTION = "modelDescription.xml"
@@ -20,6 +21,14 @@ DESCRIPTION = "modelDescription.xml"
 
 class LoadError(ValueError):
     """An FMU cannot be loaded on this machine."""
+
+
+class DescriptionError(LoadError):
+    """The description of an FMU cannot be read; the message says why."""
+
+
+UNREADABLE = (ArchiveError, PlainXmlError, LoadError, ValidationError, OSError)
+"""What `read_description` raises."""
 
 
 def read_description(path: str | Path, *, validate: bool = True) -> Any:
@@ -39,8 +48,12 @@ def read_description(path: str | Path, *, validate: bool = True) -> Any:
         If its description has a DOCTYPE, or is not in UTF-8.
     LoadError
         If it is of another version, such as 1.0, which fmpy reads as far as it fits.
-    Exception
-        Whatever fmpy raises for a description that it cannot read.
+    DescriptionError
+        If fmpy cannot read it.
+    ValidationError
+        Of fmpy, if it does not fit its schema.
+    OSError
+        If there is no such file.
     """
     with Archive(path) as archive:
         if DESCRIPTION in archive.names:
@@ -48,7 +61,18 @@ def read_description(path: str | Path, *, validate: bool = True) -> Any:
             require_plain(text, DESCRIPTION)
             if version := _other_version(text):
                 raise LoadError(f"It is of FMI {version}, and FMI 2.0 and 3.0 are run here: export it as one of them.")
-        return read_model_description(str(path), validate=validate)
+        try:
+            return read_model_description(str(path), validate=validate)
+        except ValidationError:
+            raise
+        except Exception as error:  # of no class of its own, or of whatever meets what does not fit
+            raise DescriptionError(_told(error)) from error
+
+
+def _told(error: Exception) -> str:
+    if isinstance(error, (KeyError, IndexError, TypeError, AttributeError)):
+        return f"its {DESCRIPTION} does not fit FMI's schema, and `hybrid-fmu validate` says where ({error!r})."
+    return str(error)
 
 
 def _other_version(description: bytes) -> str:

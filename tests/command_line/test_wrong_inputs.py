@@ -36,6 +36,13 @@ class Metric(Ball):
     h = hm.State(1.0, unit="meter")
 NUMBER = 3
 """
+SHOWN = """import hybrid_model as hm
+class Shown(hm.HybridAutomaton):
+    h = hm.State(1.0)
+    y = hm.Output()
+    def flow_map(self, s): return {"h": 0.0}
+    def outputs(self, s): return {"y": s.h}
+"""
 TEXTS = {
     "small.toml": S,
     "bad.toml": "name = ",
@@ -46,10 +53,13 @@ TEXTS = {
     "sys.toml": '[components.a]\nfmu = "missing.fmu"\n',
     "sys2.toml": '[components.a]\nfum = "missing.fmu"\n',
     "sys3.toml": '[components.a]\nautomaton = "hybrid_model.models:BouncingBall"\n[connections]\n"a.u" = "a.h"\n',
+    "sys4.toml": '[components.a]\nautomaton = "shown.py:Shown"\n',
+    "sys5.toml": '[components.a]\nautomaton = "ball.py:Ball"\ninterface = "cs"\n',
     "run.csv": "time,x\n0,1\n",
     "bad.sqlite": "nothing",
     "file": "",
     "ball.py": BALL,
+    "shown.py": SHOWN,
     "broken.py": "class Ball(:\n",
     "raises.py": "1/0\n",
 }
@@ -88,7 +98,8 @@ def folder(tmp_path_factory):
     (here / "folder").mkdir()
     yield here
     # Other tests have a module of this name.
-    sys.modules.pop("ball", None)
+    for name in ("ball", "shown"):
+        sys.modules.pop(name, None)
 
 
 def read(sentence):

@@ -49,8 +49,11 @@ def test_the_fixed_step_master_keeps_outputs_at_the_output_interval(stranger, tm
     times, steps = np.loadtxt(table, delimiter=",", skiprows=1, usecols=(0, 4), unpack=True)
     np.testing.assert_allclose(times, [0.0, 0.3, 0.6, 0.9, 1.2, 1.5, 1.8, 2.0], rtol=1e-15)
     assert steps[-1] == 20
-    cosim(path, "--output-interval", "0.25", status=1)
-    assert "output interval is 0.25 s, which is no multiple of the communication step, 0.1 s" in capsys.readouterr().err
+    cosim(path, "--output-interval", "0.25", status=2)
+    assert (
+        "--output-interval: the output interval is 0.25 s, which is no multiple of the communication step, 0.1 s"
+        in capsys.readouterr().err
+    )
 
 
 @pytest.mark.parametrize(
@@ -67,15 +70,25 @@ def test_the_fixed_step_master_keeps_outputs_at_the_output_interval(stranger, tm
 def test_steps_that_make_no_sense_are_refused_at_once(option, value, sentence, events, stranger, capsys):
     if events and option == "--step-size":
         option = "--output-interval"
-    cosim(stranger(events=events), option, value, status=2 if value == "0" else 1)
-    assert sentence in capsys.readouterr().err
+    cosim(stranger(events=events), option, value, status=2)
+    error = capsys.readouterr().err
+    assert error.startswith(f"hybrid-fmu: {option}")
+    assert sentence in error
+
+
+def test_times_that_an_fmu_proposes_are_its_own_matter(stranger, capsys):
+    path = stranger(experiment='startTime="3" stopTime="2"')
+    cosim(path, status=1)
+    assert "the run goes from 3.0 to 2.0 s: give finite times, the stop after the start" in capsys.readouterr().err
+    cosim(stranger(), "--start-time", "2.5", status=2)
+    assert capsys.readouterr().err.startswith("hybrid-fmu: --start-time: the run goes from 2.5 to 2.0 s")
 
 
 def test_an_fmu_of_one_step_length_gets_steps_of_that_length(stranger, capsys):
     path = stranger(variable=False, experiment='stopTime="2" stepSize="0.1"')
     cosim(path)  # its event mode is left off: events come at any distance
     assert "reached t = 2 s in 20 steps" in capsys.readouterr().out
-    cosim(path, "--stop-time", "1.95", status=1)
+    cosim(path, "--stop-time", "1.95", status=2)
     error = capsys.readouterr().err
     assert "stranger takes steps of one length only" in error
     assert "a run of 1.95 s is no multiple of 0.1 s: end it 1.9 or 2 s after its start" in error

@@ -18,7 +18,7 @@ from cosim.system import System
 from cosim.systems.assembly import assemble
 from cosim.systems.definition import Component, SystemDefinition
 from cosim.systems.files import read_system
-from cosim.systems.ssp_reading import _Reading, read_ssp
+from cosim.systems.ssp_reading import read_ssp
 from cosim.systems.ssp_writing import write_osp, write_ssp
 
 SYSTEM = """
@@ -214,7 +214,10 @@ def test_automata_are_written_as_fmus_with_their_values_as_defaults(tmp_path, ca
     ("told", "sentence"),
     [
         ({"source": False}, "component a is said to be in 'resources/stranger.fmu', which is no file in it"),
-        ({"attributes": 'type="application/x-matlab"'}, "is of type 'application/x-matlab', and FMUs alone"),
+        (
+            {"attributes": 'type="application/x-matlab"'},
+            "is of type 'application/x-matlab', and FMUs and systems alone",
+        ),
         ({"attributes": 'implementation="ScheduledExecution"'}, "is for ScheduledExecution, which no master runs"),
         ({"more": '<ssd:SignalDictionaryReference name="bus"/>'}, "it has a SignalDictionaryReference 'bus'"),
         (
@@ -401,21 +404,219 @@ def test_units_of_arrays_are_those_of_their_elements(fmi, tmp_path, exported):
         read_system(tmp_path)
 
 
-def test_units_of_parameters_are_not_looked_at_where_a_mapping_suppresses_it(by_hand, tmp_path):
-    path = by_hand()
-    with zipfile.ZipFile(path) as archive:
-        members = {name: archive.read(name) for name in archive.namelist()}
-    members["a.ssv"] = members["a.ssv"].replace(b"<ssv:Real ", b'<ssv:Real unit="kg" ')
-    for suppressed in (b"", b'suppressUnitConversion="true" '):
-        members["a.ssm"] = MAPPING.encode().replace(b"MappingEntry ", b"MappingEntry " + suppressed)
-        with zipfile.ZipFile(path, "w") as archive:
-            for name, content in members.items():
-                archive.writestr(name, content)
-        reading = _Reading(tmp_path, "hand")
-        with zipfile.ZipFile(path) as archive:
-            archive.extractall(tmp_path)
-        reading.definition(tmp_path / "SystemStructure.ssd")
-        assert (("a", "weights[1]") in reading._units) != bool(suppressed)
+BOUND = """<ssd:SystemStructureDescription version="{version}" name="bound"
+    xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon"
+    xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping"
+    xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues">
+  <ssd:System name="top"><ssd:Connectors>{border}</ssd:Connectors>{outer}<ssd:Elements>
+    <ssd:System name="inner">{middle}<ssd:Elements>
+      <ssd:Component name="rod" source="metres.fmu">{own}</ssd:Component></ssd:Elements></ssd:System>
+    <ssd:Component name="other" source="metres.fmu"/>
+  </ssd:Elements><ssd:Connections>{wires}</ssd:Connections></ssd:System>
+  <ssd:Units>
+    <ssc:Unit name="cm"><ssc:BaseUnit m="1" factor="0.01"/></ssc:Unit>
+    <ssc:Unit name="kg"><ssc:BaseUnit kg="1"/></ssc:Unit></ssd:Units>
+</ssd:SystemStructureDescription>"""
+
+
+def bound(mapping="", prefix="", **values):
+    """A binding of parameters in cm."""
+    listed = "".join(
+        f'<ssv:Parameter name="{name.replace("_", ".")}"><ssv:Real value="{value}" unit="cm"/></ssv:Parameter>'
+        for name, value in values.items()
+    )
+    return (
+        f'<ssd:ParameterBindings><ssd:ParameterBinding prefix="{prefix}"><ssd:ParameterValues>'
+        f'<ssv:ParameterSet version="1.0" name="p"><ssv:Parameters>{listed}</ssv:Parameters></ssv:ParameterSet>'
+        f"</ssd:ParameterValues>{mapping}</ssd:ParameterBinding></ssd:ParameterBindings>"
+    )
+
+
+def mapped(*entries):
+    """A mapping with entries of source, target, further attributes and transformation."""
+    listed = "".join(
+        f'<ssm:MappingEntry source="{source}" target="{target}" {more}>{scale}</ssm:MappingEntry>'
+        for source, target, more, scale in entries
+    )
+    return (
+        f'<ssd:ParameterMapping><ssm:ParameterMapping version="1.0">{listed}</ssm:ParameterMapping>'
+        "</ssd:ParameterMapping>"
+    )
+
+
+@pytest.fixture
+def heights(tmp_path, exported):
+    """Give the start values, in m, of a system by hand."""
+    shutil.copy(exported(Metres(), "metres"), tmp_path / "metres.fmu")
+
+    def read(version="1.0", **parts):
+        names = ("border", "outer", "middle", "own", "wires")
+        content = BOUND.format(version=version, **dict.fromkeys(names, "") | parts)
+        (tmp_path / "SystemStructure.ssd").write_text(content)
+        definition = read_system(tmp_path)
+        final = run_fixed_step(assemble(definition), 1.0, 0.5).final
+        return [final["inner.rod.y"], final["other.y"]], list(definition.left_out)
+
+    return read
+
+
+@pytest.mark.parametrize("version", ["1.0", "2.0"])
+@pytest.mark.parametrize(
+    ("suppressed", "scale", "expected"),
+    [("", "", 2.5), ("", TRIPLE, 8.5), (SUPPRESSED, "", 250.0), (SUPPRESSED, TRIPLE, 751.0)],
+)
+def test_a_mapping_transforms_what_has_been_converted(version, suppressed, scale, expected, heights):
+    """250 cm are 2.5 m, and 3 * 2.5 m + 1 m are 8.5 m (SSP 2.0, section 7.1.1)."""
+    mapping = mapped(("long", "height", suppressed, scale))
+    assert heights(version, own=bound(mapping, long=250.0)) == ([pytest.approx(expected), 2.0], [])
+
+
+@pytest.mark.parametrize(("wire", "expected"), [("", 8.5), (TRIPLE, 26.5)])
+def test_a_parameter_of_a_system_is_converted_before_it_is_transformed(wire, expected, heights):
+    """Its connector says no unit, and so has that of what it is connected to: 3 (3 * 2.5 m + 1 m) + 1 m."""
+    mapping = mapped(("long", "size", "", TRIPLE))
+    parts = {
+        "border": '<ssd:Connector name="size" kind="parameter"/>',
+        "outer": bound(mapping, long=250.0),
+        "wires": joined("size", "other.height", wire),
+    }
+    assert heights(**parts) == ([2.0, pytest.approx(expected)], [])
+
+
+def test_values_of_systems_further_up_go_before_those_inside(heights):
+    """By names with points, or a prefix (section 5.2.3)."""
+    own, middle = bound(height=100.0), bound(rod_height=300.0)
+    assert heights(own=own)[0] == [1.0, 2.0]
+    assert heights(own=own, middle=middle)[0] == [3.0, 2.0]
+    outer = bound(inner_rod_height=400.0, other_height=500.0)
+    assert heights(own=own, middle=middle, outer=outer)[0] == [4.0, 5.0]
+    assert heights(own=own, outer=bound(prefix="inner.rod.", height=600.0))[0] == [6.0, 2.0]
+    wires = joined("size", "other.height")
+    assert heights(outer=bound(size=700.0, other_height=500.0), wires=wires)[0] == [2.0, 7.0]
+
+
+def test_a_value_may_have_several_targets_and_what_a_mapping_does_not_name_is_not_applied(heights):
+    mapping = mapped(("long", "inner.rod.height", "", ""), ("long", "other.height", "", TRIPLE))
+    assert heights(outer=bound(mapping, long=250.0)) == ([2.5, pytest.approx(8.5)], [])
+    assert heights(own=bound(mapped(("long", "y", "", "")), height=250.0))[0] == [2.0, 2.0]
+    twice = mapped(("long", "height", "", ""), ("wide", "height", "", ""))
+    with pytest.raises(MisfitError, match="the mapping of wide has the target height, which another entry has too"):
+        heights(own=bound(twice, long=250.0, wide=1.0))
+
+
+def test_values_for_what_is_not_there_are_left_out_and_told(heights, tmp_path, capsys):
+    """A set of parameters may be for more than a system has (section 6.2)."""
+    parts = {"own": bound(height=250.0, wide=1.0), "outer": bound(inner_deep=1.0)}
+    assert heights(**parts) == ([2.5, 2.0], ["inner.rod.wide", "inner.deep"])
+    assert main(["cosim", str(tmp_path), "--stop-time", "1"]) == 0
+    told = f"{tmp_path} gives values to what is not in it, and they are left out: inner.rod.wide, inner.deep."
+    assert f"hybrid-fmu: {told}" in capsys.readouterr().err
+
+
+def test_a_value_in_a_unit_that_measures_differently_is_refused_unless_that_is_suppressed(heights):
+    mass = bound(height=250.0).replace('unit="cm"', 'unit="kg"')
+    with pytest.raises(MisfitError, match=r"inner\.rod\.height is given in 'kg', but the FMU has it in 'm', and they"):
+        heights(own=mass)
+    mapping = mapped(("height", "height", SUPPRESSED, ""))
+    assert heights(own=bound(mapping, height=250.0).replace('unit="cm"', 'unit="kg"'))[0] == [250.0, 2.0]
+
+
+CROSSING = """<ssd:SystemStructureDescription version="2.0" name="crossing"
+    xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription"
+    xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon">
+  <ssd:System name="top"><ssd:Elements>
+    <ssd:System name="inner"><ssd:Connectors><ssd:Connector name="{border}" kind="{kind}"/></ssd:Connectors>
+      <ssd:Elements>{inside}</ssd:Elements><ssd:Connections>{first}</ssd:Connections></ssd:System>{outside}
+  </ssd:Elements><ssd:Connections>{second}</ssd:Connections></ssd:System>
+</ssd:SystemStructureDescription>"""
+PART = """<ssd:Component name="{}" source="{}.fmu"><ssd:Connectors>
+  <ssd:Connector name="{}" kind="{}"/></ssd:Connectors></ssd:Component>"""
+A, B = PART.format("a", "metres", "y", "output"), PART.format("b", "millimetres", "u", "input")
+OUT = {"border": "out", "kind": "output", "inside": A, "outside": B}
+IN = {"border": "in", "kind": "input", "inside": B, "outside": A}
+
+
+def joined(start, end, scale=""):
+    """A connection between two of "element.connector", or connectors of the system itself."""
+    (a, y), (b, u) = (place.rpartition(".")[::2] for place in (start, end))
+    ends = "".join(f' {which}Element="{name}"' for which, name in (("start", a), ("end", b)) if name)
+    return f'<ssd:Connection{ends} startConnector="{y}" endConnector="{u}">{scale}</ssd:Connection>'
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(
+    ("parts", "first", "second", "expected"),
+    [
+        # 2 m out of a system, whose connector has the unit of the inside: 3 * 2 m + 1 m, in mm.
+        (OUT, ("a.y", "out", TRIPLE), ("inner.out", "b.u", ""), 7000.0),
+        (OUT, ("a.y", "out", ""), ("inner.out", "b.u", TRIPLE), 6001.0),
+        # 2 m into a system, whose connector has the unit of the inside too: 3 * 2000 mm + 1 mm.
+        (IN, ("in", "b.u", ""), ("a.y", "inner.in", TRIPLE), 6001.0),
+        (IN, ("in", "b.u", TRIPLE), ("a.y", "inner.in", TRIPLE), 18004.0),
+    ],
+)
+def test_signals_are_converted_before_each_transformation(turned, parts, first, second, expected, tmp_path, exported):
+    """Kinds of connectors say where a signal goes, and not which end of a connection is called start."""
+    shutil.copy(exported(Metres(), "metres"), tmp_path / "metres.fmu")
+    shutil.copy(exported(Millimetres(), "millimetres"), tmp_path / "millimetres.fmu")
+    wires = [joined(b, a, scale) if turned else joined(a, b, scale) for a, b, scale in (first, second)]
+    path = tmp_path / "SystemStructure.ssd"
+    path.write_text(CROSSING.format(first=wires[0], second=wires[1], **parts))
+    final = run_fixed_step(assemble(read_system(tmp_path)), 1.0, 0.5).final
+    assert final["inner.b.y" if parts is IN else "b.y"] == pytest.approx(expected)
+    path.write_text(CROSSING.format(first=wires[0], second=wires[1], **parts).replace('kind="input"', 'kind="output"'))
+    with pytest.raises(MisfitError, match=r"a connection joins .* which both"):
+        read_system(tmp_path)
+
+
+def test_elements_of_arrays_are_connected_by_their_indices(tmp_path, exported):
+    shutil.copy(exported(ManyMetres(), "many-metres"), tmp_path / "a.fmu")
+    shutil.copy(exported(ManyMillimetres(), "many-millimetres"), tmp_path / "b.fmu")
+    path, plain = tmp_path / "SystemStructure.ssd", '" endElement="b" endConnector="u"'
+    content = ARRAYS.format(values=TWO, mapping="")
+    assert plain in content
+    path.write_text(content.replace(plain, f'{plain[:1]} startIndices="2" {plain[2:]} endIndices="1"'))
+    final = run_fixed_step(assemble(read_system(tmp_path)), 1.0, 0.5).final
+    # 300 cm; the other element keeps its start value.
+    assert [final["b.y[1]"], final["b.y[2]"]] == pytest.approx([3000.0, 0.0])
+
+
+def test_a_system_in_a_file_of_its_own_is_one_in_its_place(tmp_path, exported):
+    """As .ssd beside and as .ssp; the files have units of their own, and values from outside go first."""
+    shutil.copy(exported(Metres(), "metres"), tmp_path / "metres.fmu")
+    inner = BOUND.format(version="1.0", border="", outer="", middle="", own=bound(height=100.0), wires="")
+    (tmp_path / "parts").mkdir()
+    shutil.copy(tmp_path / "metres.fmu", tmp_path / "parts" / "metres.fmu")
+    (tmp_path / "parts" / "inner.ssd").write_text(inner)
+    with zipfile.ZipFile(tmp_path / "parts" / "inner.ssp", "w") as archive:
+        archive.write(tmp_path / "metres.fmu", "metres.fmu")
+        archive.writestr("SystemStructure.ssd", inner)
+    for kind, source in (("definition", "inner.ssd"), ("package", "inner.ssp")):
+        used = (
+            f'<ssd:Component name="part" type="application/x-ssp-{kind}" source="parts/{source}">'
+            f"{bound(other_height=300.0)}</ssd:Component>"
+        )
+        outer = BOUND.format(version="1.0", border="", outer="", middle="", own="", wires="")
+        (tmp_path / "SystemStructure.ssd").write_text(
+            outer.replace("<ssd:Component name=", f"{used}<ssd:Component name=", 1).replace('name="m"', 'name="cm"')
+        )
+        definition = read_system(tmp_path)
+        final = run_fixed_step(assemble(definition), 1.0, 0.5).final
+        found = {name.removesuffix(".y"): value for name, value in final.items()}
+        assert found == {"inner.rod": 2.0, "other": 2.0, "inner.part.inner.rod": 1.0, "inner.part.other": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("given", "sentence"),
+    [
+        ('type="application/x-matlab"', "its parameters are of type 'application/x-matlab', and application/x-ssp-p"),
+        ('sourceBase="component"', r"its parameters lie inside a component \(sourceBase\): put them beside"),
+    ],
+)
+def test_parameters_that_lie_elsewhere_are_refused(given, sentence, heights):
+    with pytest.raises(MisfitError, match=sentence):
+        heights(own=bound(height=1.0).replace("<ssd:ParameterBinding ", f"<ssd:ParameterBinding {given} "))
 
 
 def test_a_path_out_of_the_archive_is_refused(by_hand, tmp_path):
@@ -440,7 +641,10 @@ def test_a_description_of_an_fmu_with_a_doctype_is_refused(stranger, tmp_path, c
 def test_what_is_wrong_in_an_ssp_is_wrong_usage_as_in_toml(by_hand, tmp_path, capsys):
     broken = tmp_path / "broken.ssp"
     broken.write_text("no archive")
-    for path, sentence in ((broken, "not a readable ZIP archive"), (by_hand(source=False), "which is no file in it")):
+    for path, sentence in (
+        (broken, "File is not a zip file. Pack the SSP anew"),
+        (by_hand(source=False), "which is no file in it"),
+    ):
         assert main(["cosim", str(path)]) == 2
         assert sentence in capsys.readouterr().err
 

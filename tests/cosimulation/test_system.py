@@ -98,11 +98,41 @@ def test_vectors_of_one_shape_are_connected_by_their_names():
         ),
         ("receiver.many", "sender.sent", "sender.sent no elements: connect arrays of one shape, or name the output of"),
         ("receiver.felt", "sender.pair", "receiver.felt has no elements"),
+        (
+            "receiver.many",
+            ["sender.sent"],
+            r"receiver.many has 2 elements, \[1\] to \[2\], but is given a list of 1 output:",
+        ),
+        (
+            "receiver.many",
+            ["sender.sent"] * 3,
+            "receiver.many has 2 elements, .* a list of 3 outputs: name one for each",
+        ),
+        (
+            "receiver.many",
+            [],
+            r'a list of 0 outputs: name one for each element, or drive single ones, as "receiver.many\[1\]"',
+        ),
+        (
+            "receiver.felt",
+            ["sender.sent"],
+            "receiver.felt is no array, but is given a list of 1 output: name one output",
+        ),
+        ("receiver.felt", [], "receiver.felt is no array, but is given a list of 0 outputs"),
+        ("receiver.nothing", ["sender.sent"], "receiver.nothing is not an input"),
     ],
 )
 def test_vectors_of_other_shapes_are_refused(target, source, sentence):
     with pytest.raises(MisfitError, match=sentence):
         wire({target: source})
+
+
+def test_a_list_drives_the_elements_of_a_table_row_by_row():
+    system = wire({"receiver.table": ["sender.sent", "sender.pair[2]"]})
+    assert [str(connection) for connection in system.connections] == [
+        "sender.sent -> receiver.table[1,1]",
+        "sender.pair[2] -> receiver.table[1,2]",
+    ]
 
 
 def test_names_that_begin_alike_are_told_apart():

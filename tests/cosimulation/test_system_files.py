@@ -101,6 +101,33 @@ def test_options_go_before_what_the_file_says(folder, capsys):
         ("[experiment]", "[experiment", "cannot be read as TOML"),
         ('automaton = "blocks.py:Sum"', 'fmu = "x.fmu"\ninterface = "se"', "interface is 'se': give one of cs, me"),
         ("stop_time = 2.2", f"stop_time = {10**400}", "experiment.stop_time is inf: give a finite number"),
+        (
+            "stop_time = 2.2",
+            "stop_time = 0",
+            "experiment.stop_time is 0, and the run starts at 0 s .* a stop after the",
+        ),
+        (
+            "stop_time = 2.2",
+            "start_time = 5\nstop_time = 2.2",
+            r"experiment.stop_time is 2.2, and the run starts at 5 s",
+        ),
+        ("stop_time = 2.2", "output_interval = 0", "experiment.output_interval is 0: give seconds, more than 0"),
+        ("stop_time = 2.2", "output_interval = -0.1", "experiment.output_interval is -0.1: give seconds"),
+        ("stop_time = 2.2", "step_size = -1", "experiment.step_size is -1: give seconds, more than 0"),
+        ("stop_time = 2.2", "tolerance = 2", "experiment.tolerance is 2: give a number between 0 and 1, such as 1e-9"),
+        ("stop_time = 2.2", "tolerance = -1e-9", "experiment.tolerance is -1e-09: give a number between 0 and 1"),
+        (
+            "stop_time = 2.2",
+            'master = "best"',
+            "experiment.master is 'best': give one of event-exact, ",
+        ),
+        ("stop_time = 2.2", "master = 1", "experiment.master is 1: give one of event-exact, "),
+        ("[components.b]", '[components.""]', "a component is called '': give it a name, which connections begin with"),
+        (
+            'automaton = "blocks.py:Sum"',
+            'automaton = "blocks.py:Sum"\ninterface = "me"',
+            "components.sum.interface is 'me', and an automaton runs in this process without one: leave it out",
+        ),
         ("period = 0.5", "period = 2026-01-01", "components.a.start.period is 2026-01-01: give a number"),
         ("period = 0.5", "period = [1, 2026-01-01]", "components.a.start.period is 2026-01-01: give a number"),
         ("period = 0.5", f"period = {10**400}", "components.a.start.period is a whole number of more than 64 bits"),
@@ -123,6 +150,12 @@ def test_what_makes_no_sense_is_refused_with_the_entry(old, new, sentence, folde
         ("period = 0.5", "perod = 0.5", "a has no variable 'perod'"),
         ('"b.count"]', '"b.cuont"]', "b.cuont is not an output"),
         ('["a.count", "b.count"]', '"a.count"', r"sum.many has the elements \[1\] to \[2\] and a.count no elements"),
+        (
+            '["a.count", "b.count"]',
+            '["a.count"]',
+            r"sum.many has 2 elements, \[1\] to \[2\], but is given a list of 1",
+        ),
+        ('"blocks.py:Sum"', '"blocks.py:Sum"\nstart.total = 1.0', "sum.total is an output that the automaton computes"),
         ("count = 10", "count = [10]", "b.count has 0 elements, but 1 values are given"),
     ],
 )
@@ -140,6 +173,8 @@ def test_what_does_not_fit_is_refused(old, new, sentence, folder):
         ("[inputs]", "[input]"),
         ('automaton = "blocks.py:Sum"', 'fmu = "nowhere.fmu"'),
         ("in.csv", "nowhere.csv"),
+        ("stop_time = 2.2", "stop_time = -1"),
+        ("stop_time = 2.2", "stop_time = 1\ntolerance = 5"),
     ],
 )
 def test_a_slip_in_the_file_is_wrong_usage(old, new, folder, capsys):
@@ -187,9 +222,12 @@ def test_outputs_that_change_at_events_alone_are_told(declared, slope, hinted, t
     assert ("a.y changed at events alone" in said.err) == hinted
 
 
-def test_a_master_that_there_is_not_is_refused(folder, capsys):
-    assert main(["cosim", str(changed(folder, "stop_time = 2.2", 'stop_time = 2.2\nmaster = "best"'))]) == 2
-    assert "the master 'best' is none of event-exact, error-controlled, fixed-step" in capsys.readouterr().err
+def test_an_interval_in_a_file_that_is_no_multiple_of_the_step_is_wrong_usage(folder, capsys):
+    given = 'stop_time = 2.2\nmaster = "fixed-step"\noutput_interval = 0.3\nstep_size = 0.2'
+    path = changed(folder, "stop_time = 2.2", given)
+    assert main(["cosim", str(path)]) == 2
+    told = "output_interval: the output interval is 0.3 s, which is no multiple of the communication step, 0.2 s: give"
+    assert f"hybrid-fmu: {path}, {told} one." in capsys.readouterr().err
 
 
 def test_a_folder_of_fmus_is_a_system_of_them(stranger, tmp_path, capsys):

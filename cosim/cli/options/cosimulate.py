@@ -9,6 +9,7 @@ from cosim.cli.options.values import (
     add_json,
     is_code,
     number,
+    part,
     positive,
     require_file,
     require_scenario,
@@ -17,6 +18,7 @@ from cosim.cli.options.values import (
     whole,
 )
 from cosim.errors import UsageError
+from cosim.systems.definition import MASTERS
 from cosim.systems.ssp_reading import VERSIONS
 from cosim.systems.toml_file import INTERFACES, is_system
 
@@ -25,7 +27,6 @@ EXAMPLES = (
     "hybrid-fmu cosim System.ssp --reference-file reference.csv",
     "hybrid-fmu cosim paper-a --master fixed-step --step-size 0.01",
 )
-EVENT_EXACT, ERROR_CONTROLLED, FIXED_STEP = MASTERS = "event-exact", "error-controlled", "fixed-step"
 ORDERS = ("jacobi", "gauss-seidel")
 PATIENCE = 60.0
 
@@ -52,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "folder for libcosim 2.0)",
     )
     parser.add_argument(
-        "--tolerance", type=positive, metavar="TOL", help="of the error-controlled master: of each step (default: 1e-9)"
+        "--tolerance", type=part, metavar="TOL", help="of the error-controlled master: of each step (default: 1e-9)"
     )
     parser.add_argument(
         "--order",

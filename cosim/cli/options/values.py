@@ -30,6 +30,14 @@ def positive(text: str) -> float:
     return value
 
 
+def part(text: str) -> float:
+    """A number between zero and one."""
+    value = _read(text)
+    if not 0.0 < value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: give a number between 0 and 1, such as 1e-9")
+    return value
+
+
 def seconds(text: str) -> float:
     """A time above zero."""
     value = _read(text)
