@@ -56,6 +56,7 @@ class Changes:
                     raise MisfitError(f"{name} has the breakpoint {time}: give finite times in s.")
                 later += [(float(time), name)] if time > t_start else []
         self._later = sorted(later, reverse=True)
+        self._reached = t_start
 
     def set_start_values(self) -> None:
         """Give the slaves, which are in initialization mode, the values at the start."""
@@ -72,7 +73,7 @@ class Changes:
         """Return what changes up to time `t` in s, which is done with it then: slave -> names for `set`."""
         due: dict[str, list[str]] = {}
         while self._later and self._later[-1][0] <= t + ROUNDING * abs(t):
-            name = self._later.pop()[1]
+            self._reached, name = self._later.pop()
             due.setdefault(self._places[name][0], []).append(name)
         return due
 
@@ -85,8 +86,12 @@ class Changes:
         return set(changed)
 
     def follow(self, t: float, *, before: bool = False) -> None:
-        """Set the curves to their values at `t` in s, behind a jump there or before it."""
-        self.set(self._curves, math.nextafter(t, -math.inf) if before else t)
+        """Set the curves to their values at `t` in s, behind a jump that is there but for rounding, or before it."""
+        if before:
+            jump = self._later[-1][0] if self._later else t
+            self.set(self._curves, math.nextafter(min(t, jump), -math.inf))
+        else:
+            self.set(self._curves, max(t, self._reached) if self._reached <= t + ROUNDING * abs(t) else t)
 
     @property
     def followed(self) -> list[str]:

@@ -11,7 +11,7 @@ from cosim.masters.changes import Changes, Given
 from cosim.masters.loops import Settling
 from cosim.masters.start import INTERVAL, STEP, outputs, require_times, sample_end, start_slaves
 from cosim.masters.treatments import by_fixed_steps
-from cosim.result import CosimResult, Watch
+from cosim.result import CosimResult, Ended, Watch
 from cosim.rounds import Ending, stepping_round
 from cosim.system import System, require_system
 from hybrid_model.declare.calls import explained
@@ -19,6 +19,8 @@ from hybrid_model.declare.calls import explained
 ORDERS = ("jacobi", "gauss-seidel")
 ROUNDING = 1e-9
 """Relative rounding of a number of steps."""
+SLIVER = 1e-9
+"""Part of a step that is too short for a step of its own: by so much a change may be before a communication point."""
 
 
 @explained(CosimError)
@@ -53,8 +55,9 @@ def run_fixed_step(
         communication point.
     inputs : mapping, optional
         ``"slave.variable"`` -> number or `hybrid_model.Signal`, for inputs that nothing drives and tunable parameters.
-        A signal is asked at the start and at its breakpoints, and its values arrive at the communication point there
-        or, where there is none, at the next. A `Curve` is asked at each communication point.
+        A signal is asked at the start and at its breakpoints, which end a step where all slaves take steps of any
+        length, and have two rows where they change outputs at once; else its values arrive at the next communication
+        point. A `Curve` is asked at each communication point.
     watch : callable, optional
         Told of the run after each row; see `CosimResult.watch`.
     order : {"jacobi", "gauss-seidel"}
@@ -95,26 +98,46 @@ def run_fixed_step(
         points = _Points(system, record)
         result.keep(t_start, record, points.read())
         step_all = _stepping(system, hand_on=order == "gauss-seidel")
+        split = SLIVER * step if all(slave.variable_step for slave in system.slaves.values()) else math.inf
         # Time by index: adding up steps would drift (rule 9).
         for k in range(1, count + 1):
-            t_next = t_stop if k == count else t_start + k * step
-            if not step_all(result, t_next):
+            grid = t_stop if k == count else t_start + k * step
+            while (due := changes.next_time(grid)) is not None and due < grid - split and step_all(result, due):
+                _change(system, changes, points, result)
+            if result.ended is not Ended.HORIZON or not step_all(result, grid):
                 sample_end(system, result, result.t, record)
                 break
-            if system.loop_iterations:
-                changes.arrive(t_next)
-                recorded = points.settle(t_next)
+            keeps = k % every == 0 or k == count
+            if due is not None:
+                _change(system, changes, points, result)
+            elif system.loop_iterations:
+                changes.arrive(grid)
+                points.keep(result, points.settle(grid), keeps)
             else:
-                recorded = points.read()
-            if k % every == 0 or k == count:
-                result.keep(t_next, record, recorded)
-            if not system.loop_iterations:
+                points.keep(result, points.read(), keeps)
                 points.exchange()
-                changes.arrive(t_next)
+                changes.arrive(grid)
         result.final = outputs(system)
     finally:
         system.close()
     return result
+
+
+def _change(system: System, changes: Changes, points: _Points, result: CosimResult) -> None:
+    """Take what changes from outside where the run is, and keep the rows before it and, if it shows, behind it."""
+    t = result.t
+    changes.follow(t, before=True)
+    before = points.read()
+    points.keep(result, before)
+    if system.loop_iterations:
+        changes.arrive(t)
+        after = points.settle(t)
+    else:
+        points.exchange()
+        changes.arrive(t)
+        after = points.read()
+        points.exchange()
+    points.keep(result, after, after != before)
 
 
 def _stepping(system: System, *, hand_on: bool) -> Callable[[CosimResult, float], bool]:
@@ -155,7 +178,7 @@ class _Points:
         self._system = system
         # One read for both: each costs a call of each FMU.
         self._read = system.reader([*record, *(f"{c.source}.{c.output}" for c in system.connections)])
-        self._recorded = len(record)
+        self._recorded, self._names = len(record), record
         self._inputs = [(system.slaves[c.target], c.input) for c in system.connections]
         self._converted = [(k, c.carried) for k, c in enumerate(system.connections) if c.converts]
         self._values: list[Any] = []
@@ -170,6 +193,11 @@ class _Points:
         for k, carried in self._converted:
             self._values[k] = carried(self._values[k])
         return values[: self._recorded]
+
+    def keep(self, result: CosimResult, recorded: list[Any], keeps: bool = True) -> None:
+        """Append a row where the run is, if that is wished."""
+        if keeps:
+            result.keep(result.t, self._names, recorded)
 
     def settle(self, t: float) -> list[Any]:
         """Carry signals round loops at `t` in s until they stand; return the recorded, which solve the loops.

@@ -57,11 +57,12 @@ def test_changes_arrive_at_communication_points_of_the_fixed_step_master(block):
         assert result.final[f"block.{name}"] == pytest.approx(value, abs=1e-9)
     # What a change makes due happens in the next step, at its beginning.
     assert result.signals["block.rounds"] == [sum(at < t - 1e-9 for at in ROUNDS) for t in result.times]
-    # A change between two points arrives at the next: a round at 0.4 s and one at 0.7 s.
+    # A change between two points ends a step: a round at 0.35 s and one at 0.65 s.
     fall = hm.Signal(lambda t: 1.0 if t < 0.35 else 0.3, [0.35])
-    late = run_fixed_step(system, t_end, 0.4, inputs={"block.limit": fall})
-    assert late.final["block.rounds"] == 2
-    assert late.final["block.x"] == pytest.approx(0.1, abs=1e-9)
+    split = run_fixed_step(system, t_end, 0.4, inputs={"block.limit": fall})
+    assert split.final["block.rounds"] == 2
+    assert split.final["block.x"] == pytest.approx(0.15, abs=1e-9)
+    assert split.steps == 3
 
 
 def test_an_input_that_nothing_drives_is_given_as_well():

@@ -8,6 +8,7 @@ import pytest
 from matplotlib.figure import Figure
 from strangers import BACKWARD
 
+import hybrid_model as hm
 from cosim.cli.main import main
 from cosim.errors import CosimError, MisfitError
 from cosim.fmu_slave import FmuSlave
@@ -47,12 +48,53 @@ def test_inputs_of_all_types_arrive_exactly(echo, tmp_path):
     out = tmp_path / "out.csv"
     assert main(["cosim", str(echo), "--input-file", str(table), "--output-file", str(out)]) == 0
     found = columns(out)
-    assert found["time"] == ["0.0", "0.5", "1.0", "1.5", "2.0"]
-    # A step shows what was set before it.
-    assert found["int64_out"] == ["-9223372036854775808"] * 3 + ["9223372036854775807"] * 2
+    # At 1 s there is a row before the jump of the table and one behind it.
+    assert found["time"] == ["0.0", "0.5", "1.0", "1.0", "1.5", "2.0"]
+    assert found["int64_out"] == ["-9223372036854775808"] * 3 + ["9223372036854775807"] * 3
     assert found["uint64_out"][-1] == "18446744073709551615"
-    assert found["string_out"] == ["a b"] * 3 + ["c"] * 2
+    assert found["string_out"] == ["a b"] * 3 + ["c"] * 3
     assert found["enumeration_out"][-1] == "7"
+
+
+class Through(hm.HybridAutomaton):
+    u = hm.Input(0.0)
+    x = hm.State(0.0, output=True)
+    y = hm.Output()
+
+    def flow_map(self, s):
+        return {"x": s.u}
+
+    def outputs(self, s):
+        return {"y": 2.0 * s.u}
+
+
+JUMPS = "time,u\n0,-1\n0.3,-1\n0.3,3\n0.75,3\n0.75,5\n1.2,5\n1.2,7\n2,7\n"
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_a_single_fmu_has_both_rows_of_each_jump_of_its_inputs(fmi, tmp_path, exported):
+    """At an output point, where 3 * 0.1 is not 0.3, and between two; what it integrates is exact: u stands still."""
+    table, out = written(tmp_path / "in.csv", JUMPS), tmp_path / "out.csv"
+    command = ["cosim", str(exported(Through(), "through", fmi)), "--input-file", str(table), "--stop-time", "1"]
+    assert main([*command, "--step-size", "0.1", "--output-file", str(out)]) == 0
+    found = {name: np.array(column, dtype=float) for name, column in columns(out).items()}
+    grid = sorted([0.1 * k for k in range(11)] + [0.3, 0.75, 0.75])
+    np.testing.assert_allclose(found["time"], grid, atol=1e-15)
+    before = np.array([-2.0] * 4 + [6.0] * 6 + [10.0] * 4)
+    np.testing.assert_array_equal(found["y"], before)
+    t = found["time"]
+    exact = -np.minimum(t, 0.3) + 3.0 * np.clip(t - 0.3, 0.0, 0.45) + 5.0 * np.maximum(t - 0.75, 0.0)
+    np.testing.assert_allclose(found["x"], exact, atol=1e-12)
+
+
+def test_jumps_of_inputs_arrive_late_where_steps_have_one_length(stranger, tmp_path):
+    path = stranger(variable=False, events=False, experiment='stopTime="1" stepSize="0.1"')
+    table, out = written(tmp_path / "in.csv", "time,int8_in\n0,1\n0.75,2\n"), tmp_path / "out.csv"
+    assert main(["cosim", str(path), "--input-file", str(table), "--output-file", str(out)]) == 0
+    found = columns(out)
+    rows = [(float(t), value) for t, value in zip(found["time"], found["int8_out"], strict=True)]
+    assert [value for t, value in rows if t == pytest.approx(0.8)] == ["1", "2"]
+    assert len(rows) == 12
 
 
 @pytest.mark.parametrize(
