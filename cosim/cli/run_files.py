@@ -14,7 +14,7 @@ import numpy as np
 from cosim.cli.exits import Exit
 from cosim.cli.progress import Work
 from cosim.masters.error_controlled import RECEIVED
-from cosim.result import CosimResult
+from cosim.result import CosimResult, Ended
 from cosim.system import System
 from cosim.tables.comparison import deviations
 from cosim.tables.picture import draw
@@ -86,22 +86,27 @@ class RunFiles:
             draw(result.times, signals, self._title, self._options.plot, show=self._options.show_plot)
         if self._options.reference_file is None:
             return int(Exit.DONE), []
-        return self._compare(result.times, signals)
+        return self._compare(result, signals)
 
     def _named(self, signals: Mapping[str, Sequence[Any]]) -> dict[str, Sequence[Any]]:
         return {self._short[name]: values for name, values in signals.items()}
 
-    def _compare(self, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> tuple[int, list[str]]:
-        tolerance, worst, lines = self._options.reference_tolerance, Exit.DONE, []
-        compared, missing = deviations(self._options.reference_file, times, signals)
-        if missing:
-            lines.append(f"  not compared, as the run has none of that form: {', '.join(missing)}")
-        for found in compared:
-            beyond = not found.largest <= tolerance
-            worst = Exit.FAILED if beyond else worst
-            line = f"{found.name} differs from {self._options.reference_file.name} by {found.largest:.3g} of its size"
-            lines.append(f"  {line}, at {found.t:.9g} s{f': beyond {tolerance:g}' if beyond else ''}")
-        return int(worst), lines
+    def _compare(self, result: CosimResult, signals: Mapping[str, Sequence[Any]]) -> tuple[int, list[str]]:
+        file, tolerance, lines = self._options.reference_file, self._options.reference_tolerance, []
+        compared = deviations(file, result.times, signals)
+        if compared.missing:
+            lines.append(f"  not compared, as the run has none of that form: {', '.join(compared.missing)}")
+        for found in compared.found:
+            beyond = f": beyond {tolerance:g}" if not found.largest <= tolerance else ""
+            line = f"{found.name} differs from {file.name} by {found.largest:.3g} of its size"
+            lines.append(f"  {line}, at {found.t:.9g} s{beyond}")
+        # A run that was to be shorter is as good as its part of the table; one that broke off is not.
+        broke_off = result.ended is not Ended.HORIZON and compared.goes_on
+        if told := compared.told():
+            lines.append(f"  {file.name}: {told}{', since it ended before its time' if broke_off else ''}")
+            print(f"hybrid-fmu: {file}: {told}.", file=sys.stderr)
+        failed = broke_off or any(not found.largest <= tolerance for found in compared.found)
+        return int(Exit.FAILED if failed else Exit.DONE), lines
 
 
 def _write_table(path: Path, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> None:

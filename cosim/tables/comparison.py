@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -35,9 +36,45 @@ class Deviation:
     t: float
 
 
-def deviations(
-    path: str | Path, times: Sequence[float], signals: Mapping[str, Sequence[Any]]
-) -> tuple[list[Deviation], list[str]]:
+@dataclass(frozen=True)
+class Comparison:
+    """A run beside a table of reference.
+
+    Attributes
+    ----------
+    found : list of Deviation
+        One a scalar of the table.
+    missing : list of str
+        Columns of the table that the run has not.
+    rows, compared : int
+        Of the table, and how many of them lie within the run.
+    table, run : tuple of float
+        First and last time in s.
+    """
+
+    found: list[Deviation]
+    missing: list[str]
+    rows: int
+    compared: int
+    table: tuple[float, float]
+    run: tuple[float, float]
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether the table has rows behind the end of the run."""
+        return not _is_within(self.table[1], self.run)
+
+    def told(self) -> str:
+        """Return in words what was not compared; nothing if the table and the run are of one time."""
+        if self.compared < self.rows:
+            left = f"{self.rows - self.compared} of its {self.rows} rows are not compared"
+            return f"{left}: it goes {_told(self.table)}, and the run {_told(self.run)}"
+        if not (_is_within(self.run[0], self.table) and _is_within(self.run[1], self.table)):
+            return f"it goes {_told(self.table)} alone, and the run {_told(self.run)}: the rest of that is not compared"
+        return ""
+
+
+def deviations(path: str | Path, times: Sequence[float], signals: Mapping[str, Sequence[Any]]) -> Comparison:
     """Compare a run with a table.
 
     At each time of the table within the run the run's value is its own there, linear between its rows; where it jumps
@@ -54,10 +91,7 @@ def deviations(
 
     Returns
     -------
-    found : list of Deviation
-        One a scalar of the table.
-    missing : list of str
-        Columns of the table that the run has not.
+    Comparison
 
     Raises
     ------
@@ -66,9 +100,13 @@ def deviations(
     """
     told, columns = read_columns(path)
     grid, here = np.array(told), np.array(times)
-    within = (grid >= here[0]) & (grid <= here[-1] + ROUNDING * abs(here[-1])) if times else np.zeros(len(told), bool)
+    ends, span = (float(grid[0]), float(grid[-1])), (float(here[0]), float(here[-1])) if times else (math.nan, math.nan)
+    within = np.array([_is_within(float(t), span) for t in told])
     if not within.any():
-        raise MisfitError(f"{path} and the run have no time in common.")
+        raise MisfitError(
+            f"{path} and the run have no time in common: it goes {_told(ends)}, and the run "
+            f"{_told(span)}. Give a table of that time."
+        )
     found: list[Deviation] = []
     missing: list[str] = []
     for name, column in columns.items():
@@ -80,8 +118,18 @@ def deviations(
         except ValueError as error:
             raise MisfitError(f"{path}, column {name}: {error}: give numbers.") from error
     if not found:
-        raise MisfitError(f"{path} has none of the columns {', '.join(signals)}.")
-    return found, missing
+        raise MisfitError(f"{path} has none of the columns {', '.join(signals)}: give it one that is called so.")
+    return Comparison(found, missing, len(told), int(within.sum()), ends, span)
+
+
+def _told(span: tuple[float, float]) -> str:
+    return f"from {span[0]:.9g} to {span[1]:.9g} s"
+
+
+def _is_within(t: float, span: tuple[float, float]) -> bool:
+    """Return whether a time is not before or behind a span but for rounding."""
+    slack = ROUNDING * max(abs(span[0]), abs(span[1]))
+    return span[0] - slack <= t <= span[1] + slack
 
 
 def _elements(name: str, texts: list[str], signals: Mapping[str, Sequence[Any]]) -> list[tuple[str, list[str]]]:

@@ -217,12 +217,42 @@ def test_a_run_is_compared_with_a_table(echo, tmp_path, capsys):
     assert main(["cosim", str(echo), "--reference-file", str(off), "--reference-tolerance", "0.02"]) == 0
 
 
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ("0,0\n2,0.8\n", ""),
+        ("0,0\n2,0.8\n3,3\n", "1 of its 3 rows are not compared: it goes from 0 to 3 s, and the run from 0 to 2 s"),
+        ("-1,0\n0,0\n2,0.8\n", "1 of its 3 rows are not compared: it goes from -1 to 2 s, and the run from 0 to 2 s"),
+        (
+            "0,0\n1,0.4\n",
+            "it goes from 0 to 1 s alone, and the run from 0 to 2 s: the rest of that is not compared",
+        ),
+    ],
+)
+def test_what_is_not_compared_is_told(rows, told, echo, tmp_path, capsys):
+    table = written(tmp_path / "ref.csv", f"time,x\n{rows}")
+    assert main(["cosim", str(echo), "--start-value", "rate=0.4", "--reference-file", str(table)]) == 0
+    said = capsys.readouterr()
+    assert (f"{table}: {told}" in said.err) if told else said.err == ""
+    assert not told or f"  ref.csv: {told}" in said.out
+
+
+@pytest.mark.parametrize(("rows", "status"), [("0,0\n0.5,0.5\n1,0\n", 0), ("0,0\n0.5,0.5\n1,0\n2,0\n", 1)])
+def test_a_run_that_ended_early_does_not_agree_with_a_table_that_goes_on(rows, status, stranger, tmp_path, capsys):
+    """It ends the run itself at 1 s, as it may."""
+    table = written(tmp_path / "ref.csv", f"time,x\n{rows}")
+    path = stranger(events=False, experiment='stopTime="2" stepSize="0.5"')
+    command = ["cosim", str(path), "--start-value", "ends=1", "--reference-file", str(table)]
+    assert main(command) == status
+    assert ("since it ended before its time" in capsys.readouterr().out) == bool(status)
+
+
 def test_at_a_jump_either_side_is_right_and_texts_are_compared(tmp_path):
     table = written(tmp_path / "ref.csv", "time,x,s,v\n0,0,a,1 2\n1,5,a,1 2\n1.5,5.5,b,1 2\n")
     signals = {"x": [0.0, 1.0, 5.0, 6.0], "s": ["a", "a", "b", "b"], "v[1]": [1.0] * 4, "v[2]": [2.0, 2.0, 2.0, 2.5]}
-    found, missing = deviations(table, [0.0, 1.0, 1.0, 2.0], signals)
-    assert missing == []
-    largest = {deviation.name: deviation.largest for deviation in found}
+    compared = deviations(table, [0.0, 1.0, 1.0, 2.0], signals)
+    assert compared.missing == []
+    largest = {deviation.name: deviation.largest for deviation in compared.found}
     assert largest["x"] == 0.0
     assert largest["s"] == 1.0
     assert largest["v[2]"] == pytest.approx(0.125)
@@ -235,7 +265,10 @@ def test_at_a_jump_either_side_is_right_and_texts_are_compared(tmp_path):
     [
         (b"time,x\n0,0\n0.5,abc\n", "column x: could not convert string to float: 'abc'"),
         (b"time,x\n0,0\nlate,1\n", "row 3: the time 'late' is no finite number"),
-        (b"time,x\n-1,0\n10,1\n", "and the run have no time in common"),
+        (
+            b"time,x\n-1,0\n10,1\n",
+            "and the run have no time in common: it goes from -1 to 10 s, and the run from 0",
+        ),
         (b"time,x\n0,0\n1\n", "row 3: it has 1 fields, but there are 2 names"),
         (b"\xff\xfe\x00", "no file of comma-separated values in UTF-8"),
         (b"", "no line of names that begins with time"),
