@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import tempfile
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
@@ -22,6 +21,7 @@ from hybrid_model import Automaton, Network
 from hybrid_model.declare.arguments import require_automaton
 from hybrid_model.declare.calls import explained
 from hybrid_model.declare.real_numbers import is_real
+from hybrid_model.native.build.scratch import ScratchFolder
 from hybrid_model.native.kept_models import kept_trace
 
 KINDS = ("cs", "me")
@@ -111,7 +111,7 @@ def export_fmu(
     written = [content["modelDescription.xml"], code.encode(), *map(Path.read_bytes, [*runtime, *_headers()])]
     token = hashlib.sha256(b"".join(written)).hexdigest()[: len(_TOKEN)]
     members = {name: item.replace(_TOKEN.encode(), token.encode()) for name, item in content.items()}
-    with tempfile.TemporaryDirectory() as folder:
+    with ScratchFolder() as folder:
         generated = Path(folder) / "model.c"
         generated.write_text(code.replace(_TOKEN, token), encoding="ascii")
         identifier = model_identifier(automaton.name)

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from hybrid_model.native.build.objects import (
     kept_units,
     object_name,
 )
+from hybrid_model.native.build.scratch import ScratchFolder
 from hybrid_model.native.engine_files import ENGINE_FOLDERS
 
 _LINUX_LINK = "-Wl,-z,defs,-z,noexecstack,-z,relro,-z,now"
@@ -72,7 +72,7 @@ def build_libraries(
     identity = compiler_identity(compiler)
     # Compilers run in folders of ours: a relative path would not be found there.
     command = [os.path.abspath(shutil.which(compiler[0]) or compiler[0]), *compiler[1:]]
-    with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as name:
+    with ScratchFolder() as name:
         scratch = Path(name).resolve()
         toolchains = {platform: Toolchain((*command, *_target(command, platform)), identity) for platform in platforms}
         builds = {}

@@ -7,7 +7,6 @@ what it has: `load_network_events` reads it.
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
@@ -15,6 +14,7 @@ from typing import IO, Any
 import numpy as np
 
 from hybrid_model.errors import DataError
+from hybrid_model.native.build.scratch import ScratchFolder
 from hybrid_model.native.network_run import EventColumns
 from hybrid_model.schedule.network_events import NetworkEvents
 
@@ -52,7 +52,7 @@ class EventStore:
         self._limit = LIMIT if limit is None else limit
         self._chunks: list[EventColumns] = []
         self._numbers = 0
-        self._passing: tempfile.TemporaryDirectory[str] | None = None
+        self._passing: ScratchFolder | None = None
         self._files: dict[str, IO[bytes]] = {}
         self._folder = folder
         if folder is not None:
@@ -65,7 +65,7 @@ class EventStore:
             self._numbers += len(events.t) * (2 + self._width)
             if self._numbers <= self._limit:
                 return
-            self._passing = tempfile.TemporaryDirectory(prefix="hybrid-fmu-events-")
+            self._passing = ScratchFolder()
             self._open(Path(self._passing.name))
             chunks, self._chunks = self._chunks, []
             for chunk in chunks:

@@ -21,6 +21,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from hybrid_model.native.build.cache_folder import is_private, trusted_folder
+from hybrid_model.native.build.scratch import PREFIX, ScratchFolder, locked, remove_abandoned
 
 LIMIT = 512 * 2**20
 """Bytes that the cache holds at most: in each of its folders an equal share, or a single larger file."""
@@ -50,7 +51,7 @@ def kept(name: str, key: str, make: Callable[[Path], None]) -> Path:
     [found] = _find([(name, key)])
     if found is not None:
         return found[0]
-    with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as scratch:
+    with ScratchFolder() as scratch:
         fresh = Path(scratch).resolve() / name
         make(fresh)
         return keep(name, key, fresh.read_bytes())
@@ -184,7 +185,9 @@ class _Own:
         with cls._lock:
             made = cls.made()
             if made is None:
-                made = Path(tempfile.mkdtemp(prefix="hybrid-fmu-")).resolve()
+                remove_abandoned()
+                made = Path(tempfile.mkdtemp(prefix=PREFIX)).resolve()
+                locked(made)
                 cls._folder = os.getpid(), made
                 atexit.register(_remove, os.getpid(), made)
             return made

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +21,7 @@ from hybrid_model.native.build.objects import (
     digest,
     kept_units,
 )
+from hybrid_model.native.build.scratch import ScratchFolder
 from hybrid_model.native.engine_files import ENGINE_FOLDERS, RUNS_FOLDERS
 
 MODEL_SYMBOL = "model_of_library"
@@ -135,7 +135,7 @@ def _engine_digest(pattern: str) -> str:
 
 @contextmanager
 def _folder(name: str) -> Iterator[Path]:
-    with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as scratch:
+    with ScratchFolder() as scratch:
         folder = Path(scratch).resolve() / name
         folder.mkdir()
         yield folder
