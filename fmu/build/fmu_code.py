@@ -46,7 +46,9 @@ def fmu_code(traced: Trace | NetworkTrace, variables: Sequence[FmuVariable], tok
     parts = assembly_code(traced) if "cs" in kinds and isinstance(traced, NetworkTrace) else None
     fields["assembly"] = "NULL" if parts is None else "&assembly"
     described = [table, names.definition("variable_names"), definition("Description", "description", fields)]
-    return "\n".join([model_code(traced), parts or "", '#include "description.h"', "", *described])
+    return "\n".join(
+        [model_code(traced, by_parts=parts is not None), parts or "", '#include "description.h"', "", *described]
+    )
 
 
 def _variable(variable: FmuVariable, names: NameTable) -> str:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hybrid_model.declare.transitions import Trigger
 from hybrid_model.declare.variables import FloatArray, Kind
 from hybrid_model.native.c_text import array, constant, definition, row
-from hybrid_model.native.model_code import model_definition, model_tables, nominals
+from hybrid_model.native.model_code import held_tables, model_definition, model_tables, nominals
 from hybrid_model.native.names import NameTable
 from hybrid_model.native.networks.groups import Group
 from hybrid_model.native.networks.members import SOURCES, Member
@@ -168,6 +168,7 @@ class _Tables:
             "margins": Trigger.STATE in triggers,
             "times": Trigger.TIME in triggers,
             "outputs": sizes[Kind.OUTPUT] > 0,
+            "factors": group.factors is not None,
         }
         take = _CONSTANTS.format(own=sizes[Kind.PARAMETER])
         maps = {}
@@ -186,13 +187,15 @@ class _Tables:
             body = f"{take}    return group{group.number}_resets[jump](arg, res, iw, w, 0);"
             yield f"static int {prefix}reset(size_t jump, {_CALL[1:]})\n{{\n{body}\n}}\n"
         yield from model_tables(kind.member.automaton, kind.member.layout, prefix)
+        yield from held_tables(group.factors, prefix)
         yield model_definition(
             group.traced,
-            self._network.work_sizes,
+            self._network.definitions(factors=True).work,
             kind.member.path.rpartition(".")[2],
             prefix=prefix,
             maps=maps,
             constants=group.constants.shape[1],
+            held=group.factors,
         )
 
 

@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from hybrid_model.native.flow_structure import levels_of_quadratures
-from hybrid_model.native.trace import ARGUMENTS, Trace
+from hybrid_model.native.trace import ARGUMENTS
 
 __all__ = ["HeldFactors", "held_factors"]
 
@@ -43,34 +42,36 @@ class HeldFactors:
     keys: tuple[int, ...]
 
 
-def held_factors(traced: Trace) -> HeldFactors | None:
+def held_factors(flow: ca.Function, name: str = "hybrid_factors") -> HeldFactors | None:
     """Find the values that the rates of an automaton are affine in.
 
     Parameters
     ----------
-    traced : Trace
-        The automaton's maps.
+    flow : casadi.Function
+        t, x, z, u, p -> rates; what follows p counts as behind it.
+    name : str
+        Of the function that is made.
 
     Returns
     -------
     HeldFactors or None
         None where a rate depends on a continuous state, or no value is a factor.
     """
-    if levels_of_quadratures(traced.pattern("flow", "x")) != 1:
+    arguments = flow.sx_in()
+    if not arguments[_X].numel() or flow.jac_sparsity(0, _X).nnz():
         return None
-    arguments = traced.flow.sx_in()
-    (rates,) = traced.flow.call(arguments)
+    (rates,) = flow.call(arguments)
     values = ca.vertcat(arguments[_Z], arguments[_U])
-    held = _affine_in(traced.flow, arguments[_Z].numel(), values.numel())
+    held = _affine_in(flow, arguments[_Z].numel(), values.numel())
     if not held:
         return None
     factors = ca.jacobian(rates, values[list(held)])
     constant = ca.substitute(rates, values[list(held)], ca.SX.zeros(len(held)))
     rows, columns = factors.sparsity().get_triplet()
     results = [ca.densify(constant), ca.vec(factors.nz[:])]
-    others = ca.vertcat(values, arguments[_P])
+    others = ca.vertcat(values, *arguments[_P:])
     _, keys = ca.jacobian_sparsity(ca.vertcat(*results), others).get_triplet()
-    function = ca.Function("hybrid_factors", arguments, results)
+    function = ca.Function(name, arguments, results)
     return HeldFactors(function, held, tuple(rows), tuple(columns), tuple(sorted(set(keys))))
 
 

@@ -21,20 +21,22 @@ from hybrid_model.native.networks.network import NetworkTrace
 from hybrid_model.native.trace import Trace, changed
 
 
-def model_code(traced: Trace | NetworkTrace) -> str:
+def model_code(traced: Trace | NetworkTrace, *, by_parts: bool = False) -> str:
     """Return the C source of a model.
 
     Parameters
     ----------
     traced : Trace or NetworkTrace
         The automaton's maps.
+    by_parts : bool
+        Whether a network comes with what its parts need to run on their own.
 
     Returns
     -------
     str
         A C99 translation unit that defines ``const Model model``.
     """
-    maps, work = _maps(traced, derivatives=True, jacobian=traced.automaton.stiff is True)
+    maps, work = _maps(traced, derivatives=True, jacobian=traced.automaton.stiff is True, by_parts=by_parts)
     model = model_definition(traced, work, traced.automaton.name, starts=True)
     tables = [*_starts(traced.layout), *model_tables(traced.automaton, traced.layout)]
     return "\n".join([_PRELUDE, maps, *tables, model])
@@ -58,19 +60,25 @@ def run_code(traced: Trace | NetworkTrace, *, jacobian: bool = False) -> str:
     str
         A C99 translation unit that defines ``const Model model``, for `hybrid_model.native.build.libraries`.
     """
-    # Of use to networks that run part by part alone, which are no FMUs of one automaton.
-    held = held_factors(traced) if isinstance(traced, Trace) else None
+    # Of use to parts of networks alone, which run on their own; FMUs have theirs in the tables of their parts.
+    held = held_factors(traced.flow) if isinstance(traced, Trace) else None
     maps, work = _maps(traced, held, derivatives=False, jacobian=jacobian or traced.automaton.stiff is True)
     model = model_definition(traced, work, type(traced.automaton).__name__, held=held)
     return "\n".join([_PRELUDE, maps, *model_tables(traced.automaton, traced.layout), model])
 
 
 def _maps(
-    traced: Trace | NetworkTrace, held: HeldFactors | None = None, *, derivatives: bool, jacobian: bool
+    traced: Trace | NetworkTrace,
+    held: HeldFactors | None = None,
+    *,
+    derivatives: bool,
+    jacobian: bool,
+    by_parts: bool = False,
 ) -> tuple[str, Sequence[int]]:
     """Return the definitions of the maps and of what follows from them, and the sizes of the work arrays they need."""
     if isinstance(traced, NetworkTrace):
-        return "\n".join([traced.c_code(), _NO_JACOBIAN]), traced.work_sizes
+        network = traced.definitions(factors=by_parts)
+        return "\n".join([network.text, _NO_JACOBIAN]), network.work
     found = {**(derivative_functions(traced) if derivatives else {})}
     if jacobian:
         found["jacobian"] = jacobian_function(traced)
@@ -88,18 +96,19 @@ def _maps(
             "",
             *_resets(traced, resets, work[-1]),
             *without,
-            *_held_tables(held),
+            *held_tables(held),
         ]
     )
     work[-1] += max((len(reset.x) + len(reset.z) for reset in resets), default=0)
     return code, work
 
 
-def _held_tables(held: HeldFactors | None) -> list[str]:
+def held_tables(held: HeldFactors | None, prefix: str = "") -> list[str]:
+    """Return the tables of what rates are affine in, their names after a prefix; none where there are none."""
     if held is None:
         return []
-    columns = {"held": held.held, "factor_rows": held.rows, "factor_columns": held.columns, "factor_keys": held.keys}
-    return [array("uint32_t", name, map(str, numbers)) for name, numbers in columns.items()]
+    columns = zip(_HELD, (held.held, held.rows, held.columns, held.keys), strict=True)
+    return [array("uint32_t", f"{prefix}{name}", map(str, numbers)) for name, numbers in columns]
 
 
 class _Reset:
@@ -130,6 +139,7 @@ def _resets(traced: Trace, resets: Sequence[_Reset], own: int) -> list[str]:
     ]
 
 
+_HELD = ("held", "factor_rows", "factor_columns", "factor_keys")
 _DERIVATIVES = ("forward", "reverse", "start_forward", "start_reverse", "jacobian")
 _MAPS = ("start", "flow", "flow_set", "margins", "times", "outputs", "reset", *_DERIVATIVES)
 _NO_JACOBIAN = "#define hybrid_jacobian NULL\n"
@@ -206,9 +216,9 @@ def _jumps(automaton: Automaton, names: NameTable) -> list[str]:
     return rows
 
 
-def _held_fields(held: HeldFactors) -> dict[str, object]:
-    tables = {name: name for name in ("held", "factor_rows", "factor_columns", "factor_keys")}
-    return {"factors": "hybrid_factors", "n_factors": len(held.rows), "n_factor_keys": len(held.keys), **tables}
+def _held_fields(held: HeldFactors, prefix: str) -> dict[str, object]:
+    tables = {name: f"{prefix}{name}" for name in _HELD}
+    return {"n_factors": len(held.rows), "n_factor_keys": len(held.keys), **tables}
 
 
 def model_definition(
@@ -244,6 +254,7 @@ def model_definition(
         The factors of its rates, if there are any.
     """
     automaton, sizes = traced.automaton, traced.layout.sizes
+    wanted = _MAPS if held is None else (*_MAPS, "factors")
     fields = {
         "name": string(name),
         "n_states": sizes[Kind.STATE],
@@ -261,9 +272,9 @@ def model_definition(
         "quadratures": levels_of_quadratures(traced.pattern("flow", "x")),
         "predictable": boolean(all(place.variable.discrete for place in traced.layout.places[Kind.INPUT])),
         **{name: f"start_{name}" if starts else "NULL" for name in _VECTORS},
-        **{name: f"hybrid_{name}" if maps is None else maps.get(name, "NULL") for name in _MAPS},
+        **{name: f"hybrid_{name}" if maps is None else maps.get(name, "NULL") for name in wanted},
         "scales": row(*(f".{name} = {_number(value)}" for name, value in scales.of_models().items())),
-        **({} if held is None else _held_fields(held)),
+        **({} if held is None else _held_fields(held, prefix)),
         **{name: f"{prefix}{name}" for name in ("nominals", "whole", "jumps")},
         **{name: f"{prefix}{name}" for name in ("state_names", "discrete_names", "margin_names", "names")},
     }

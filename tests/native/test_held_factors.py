@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import hybrid_model as hm
+from hybrid_model.native.assembly_code import assembly_code
 from hybrid_model.native.held_factors import held_factors
+from hybrid_model.native.model_code import model_code
+from hybrid_model.native.networks.network import network_trace
 from hybrid_model.native.trace import ARGUMENTS, trace
 
 
@@ -22,7 +25,7 @@ class Heard(hm.HybridAutomaton):
 def held_of(rate):
     """Names of the values that a rate is affine in, and of what the rest depends on."""
     traced = trace(type("Heard", (Heard,), {"flow_map": lambda self, s: {"x": rate(s)}})())
-    found = held_factors(traced)
+    found = held_factors(traced.flow)
     if found is None:
         return None
     names = ["m", "n", "u", "v", "p"]
@@ -65,3 +68,37 @@ def test_values_that_rates_are_affine_in(rate, held, keys):
 )
 def test_rates_without_factors(rate):
     assert held_of(rate) is None
+
+
+class Wave(Heard):
+    """Each instance has a frequency of its own in its maps."""
+
+    def __init__(self, name, frequency):
+        super().__init__(name)
+        self.frequency = frequency
+
+    def flow_map(self, s):
+        return {"x": np.sin(self.frequency * s.t) * (s.u - s.m) + s.p}
+
+
+def test_constants_in_which_the_parts_of_a_group_differ_are_among_what_functions_depend_on():
+    network = network_trace(hm.Composition("waves", {"a": Wave("a", 3.0), "b": Wave("b", 5.0)}))
+    (group,) = network.groups
+    held = group.factors
+    # Places in z, u, p and then the constants: m, n, u, v, p, the frequency.
+    assert (held.held, held.keys) == ((0, 2), (4, 5))
+    for constants in group.constants:
+        rate, factors = held.function(0.7, [0.2], [1.3, -0.4], [0.9, 2.1], [1.7], constants)
+        assert float(rate) == 1.7
+        np.testing.assert_allclose(
+            np.ravel(factors), np.sin(constants[0] * 0.7) * np.array([-1.0, 1.0]), rtol=1e-15, atol=0
+        )
+
+
+def test_parts_that_run_on_their_own_in_an_fmu_have_factors_and_the_network_as_one_has_not():
+    network = network_trace(hm.Composition("waves", {"a": Wave("a", 3.0), "b": Wave("b", 5.0)}))
+    tables = assembly_code(network)
+    assert ".factors = part0_factors," in tables
+    assert "part0_factor_keys[] = {\n    4,\n    5\n};" in tables
+    assert "group0_factors(" in model_code(network, by_parts=True)
+    assert "factors" not in model_code(network)

@@ -319,6 +319,6 @@ def test_a_network_of_next_to_nothing():
     Still = type("Still", (hm.HybridAutomaton,), {"p": hm.Parameter(1.0)})
     traced = network_trace(hm.Composition("still", {"a": Still("a"), "b": Still("b")}))
     assert [len(group.members) for group in traced.groups] == [2]
-    assert traced.work_sizes[:2] == (10, 5)
+    assert traced.definitions().work[:2] == (10, 5)
     assert traced.pattern("flow", "p").shape == (0, 2)
-    assert "hybrid_reset" in traced.c_code()
+    assert "hybrid_reset" in traced.definitions().text

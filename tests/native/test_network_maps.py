@@ -44,7 +44,7 @@ class Compiled:
             "int call_reset(const double **arg, double **res, long long *iw, double *w, size_t jump)"
             "{ return hybrid_reset(jump, arg, res, iw, w); }\n"
         )
-        source.write_text(traced.c_code() + "".join(calls), encoding="ascii")
+        source.write_text(traced.definitions().text + "".join(calls), encoding="ascii")
         common = [
             *find_compiler(),
             "-std=c99",
@@ -60,7 +60,7 @@ class Compiled:
             subprocess.run([*common, *STRICT_FLAGS, "-Werror", "-c", own, "-o", target], check=True)
         subprocess.run([*common, "-shared", generated, *runtime, "-lm", "-o", library], check=True)
         self.library = ctypes.CDLL(str(library))
-        self.sizes = traced.work_sizes
+        self.sizes = traced.definitions().work
         self.size = library.stat().st_size
 
     def __call__(self, name, arguments, sizes, jump=None, unwanted=()):

@@ -23,7 +23,7 @@ class Node(hm.HybridAutomaton):
         return {"sent": s.x}
 
     def flow_map(self, s):
-        on = 0.5 + 0.5 * np.cos(np.pi * s.phase)
+        on = (0.5 + 0.5 * np.cos(np.pi * s.phase)) * (1.0 + 0.4 * np.sin(5.0 * s.t))
         return {"x": on * s.gain * np.sum(s.heard - s.sent) + s.push}
 
     def outputs(self, s):

@@ -37,14 +37,27 @@ class NetworkCode:
         Number of each member's group.
     order : Order
         Of outputs and start values.
+    factors : bool
+        Whether the factors of the groups' rates are there too.
     """
 
-    def __init__(self, members: Members, groups: Sequence[Group], group_of: Sequence[int], order: Order) -> None:
+    def __init__(
+        self,
+        members: Members,
+        groups: Sequence[Group],
+        group_of: Sequence[int],
+        order: Order,
+        *,
+        factors: bool = False,
+    ) -> None:
         self._members, self._groups, self._group_of, self._order = members, groups, group_of, order
         if max(members.layout.sizes.values()) >= 1 << _SOURCE_BITS:
             raise NotLoopable("The network has more variables than the tables can number.")
         self._functions: dict[str, ca.Function] = {}
         self._group_rows = [self._group(group) for group in groups]
+        for group in groups if factors else ():
+            if group.factors is not None:
+                self._add(group.factors.function, f"group{group.number}_factors")
         self._piece_rows = [self._piece(number, piece) for number, piece in enumerate(order.pieces)]
 
     @property

@@ -15,6 +15,7 @@ import casadi as ca
 import numpy as np
 
 from hybrid_model.declare.variables import FloatArray, Kind
+from hybrid_model.native.held_factors import HeldFactors, held_factors
 from hybrid_model.native.trace import Trace, changed
 
 Structure = tuple[object, ...]
@@ -56,6 +57,11 @@ class Group:
     def starts(self) -> bool:
         """Whether some start value is computed."""
         return self.changes("start", Kind.STATE) or self.changes("start", Kind.DISCRETE)
+
+    @functools.cached_property
+    def factors(self) -> HeldFactors | None:
+        """What the rates are affine in; the constants lie behind the parameters."""
+        return held_factors(self.maps["flow"], f"group{self.number}_factors")
 
     def changes(self, name: str, kind: Kind) -> bool:
         """Whether a map that gives new states changes those of a kind."""

@@ -16,6 +16,7 @@ from hybrid_model.declare.automaton import Automaton
 from hybrid_model.declare.composition import Composition
 from hybrid_model.declare.layout import Layout
 from hybrid_model.declare.variables import Kind
+from hybrid_model.native.c_text import Definitions
 from hybrid_model.native.networks.code import NetworkCode
 from hybrid_model.native.networks.evaluation_order import Order, order
 from hybrid_model.native.networks.groups import Group, grouped
@@ -66,10 +67,6 @@ class NetworkTrace:
         """What depends on what."""
         return NetworkPattern(self.members, self.groups, self.group_of, self.order)
 
-    @functools.cached_property
-    def _code(self) -> NetworkCode:
-        return NetworkCode(self.members, self.groups, self.group_of, self.order)
-
     def pattern(self, result: str, argument: str) -> scipy.sparse.csr_array:
         """Return which elements of a result depend on which of an argument.
 
@@ -111,19 +108,21 @@ class NetworkTrace:
         """Number of scalars in u."""
         return self.layout.sizes[Kind.INPUT]
 
-    def c_code(self) -> str:
-        """Return C99 that defines the functions of hybrid_model/engine/model.h.
+    @functools.cache  # noqa: B019 - its definitions live as long as the network
+    def definitions(self, *, factors: bool = False) -> Definitions:
+        """Return C99 that defines the functions of hybrid_model/engine/model.h, and the work arrays they need.
 
         They are static: ``hybrid_start``, ``hybrid_flow``, ``hybrid_flow_set``, ``hybrid_margins``, ``hybrid_times``,
         ``hybrid_outputs``, ``hybrid_reset`` (which takes the number of the jump), ``hybrid_forward``,
         ``hybrid_reverse``, ``hybrid_start_forward`` and ``hybrid_start_reverse``.
-        """
-        return self._code.text()
 
-    @property
-    def work_sizes(self) -> tuple[int, int, int, int]:
-        """Sizes that these functions need of arg, res, iw and w."""
-        return self._code.work_sizes
+        Parameters
+        ----------
+        factors : bool
+            Whether those of the groups' rates are there too, which parts that run on their own have a use for.
+        """
+        code = NetworkCode(self.members, self.groups, self.group_of, self.order, factors=factors)
+        return Definitions(code.text(), code.work_sizes)
 
 
 def worth_looping(automaton: Automaton) -> bool:
