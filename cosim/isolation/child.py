@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import os
 import sys
+import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any
@@ -78,6 +80,21 @@ class Served:
         return getattr(self._slave, name)
 
 
+def end_with_parent() -> None:
+    """Let this process end when the one that started it is gone, however that ended and whatever an FMU does here.
+
+    Native code may be in a loop for ever; a thread of Python goes on beside it, and sees the end of the input that the
+    other process holds open.
+    """
+
+    def wait() -> None:
+        while os.read(sys.stdin.fileno(), 1):
+            pass
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
 def serve(connection: Connection) -> None:
     """Make the slave that the first message describes, and answer calls until the other side is gone."""
     served: Any = None
@@ -104,4 +121,5 @@ def serve(connection: Connection) -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     serve(Connection(int(sys.argv[1])))

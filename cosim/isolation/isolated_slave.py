@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import signal
 import socket
 import subprocess
@@ -21,6 +20,8 @@ PATIENCE = 60.0
 """Seconds that one call may take."""
 GOODBYE = 2.0
 """Seconds that a process has to end by itself."""
+SHOWN = 3
+"""Most names of variables in a message."""
 
 
 class IsolatedSlave(Slave):
@@ -42,6 +43,11 @@ class IsolatedSlave(Slave):
     patience : float
         Seconds that one call may take.
 
+    Attributes
+    ----------
+    failed_at_end : str
+        What went wrong when its instance was freed, where that did; the run is over then.
+
     Raises
     ------
     CosimError
@@ -62,6 +68,8 @@ class IsolatedSlave(Slave):
         self._connection: Connection | None = None
         self._make = (kind, name, str(path)), {"validate": validate}
         self._given: list[tuple[str, Value]] = []
+        self._readers: dict[int, str] = {}
+        self.failed_at_end = ""
         self._begin()
         super().__init__(name, list(self.inputs.values()), list(self.outputs.values()), self.clocks, self.tunable)
 
@@ -91,12 +99,16 @@ class IsolatedSlave(Slave):
 
     def reader(self, names: Sequence[str]) -> Callable[[], list[Any]]:
         """See `Slave.reader`."""
-        handle = self._call("reader", list(names))
-        return lambda: list(self._call("read", handle))
+        return self._read_by("reader", names)
 
     def slopes(self, names: Sequence[str]) -> Callable[[], list[float]]:
         """See `Slave.slopes`."""
-        handle = self._call("slopes", list(names))
+        return self._read_by("slopes", names)
+
+    def _read_by(self, kind: str, names: Sequence[str]) -> Callable[[], list[Any]]:
+        handle = self._call(kind, list(names))
+        some = ", ".join(names[:SHOWN]) + (f" and {len(names) - SHOWN} more" if len(names) > SHOWN else "")
+        self._readers[handle] = f"reading {'slopes of ' * (kind == 'slopes')}{some}"
         return lambda: list(self._call("read", handle))
 
     def lead(self, lines: Mapping[str, tuple[float, float]]) -> None:
@@ -143,8 +155,10 @@ class IsolatedSlave(Slave):
         """See `Slave.close`; the process ends."""
         if self._process is None:
             return
-        with contextlib.suppress(CosimError):
+        try:
             self._call("close")
+        except CosimError as error:
+            self.failed_at_end = str(error)
         self._end()
 
     @property
@@ -158,7 +172,7 @@ class IsolatedSlave(Slave):
         try:
             # An interrupt from the keyboard is for this process alone.
             self._process = subprocess.Popen(
-                command, pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL, start_new_session=True
+                command, pass_fds=[theirs.fileno()], stdin=subprocess.PIPE, start_new_session=True
             )
         except OSError as error:
             raise CosimError(f"{self.name}: no process can be started for it: {error}.") from error
@@ -176,6 +190,7 @@ class IsolatedSlave(Slave):
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
         if self._connection is None:
             raise CosimError(f"{self.name}: its process is gone, so {_told(method, arguments)} cannot be called.")
+        told = self._readers.get(arguments[0], "") if method == "read" else _told(method, arguments)
         self._started = self._started or method == "start"
         try:
             self._connection.send((method, arguments, named))
@@ -184,12 +199,11 @@ class IsolatedSlave(Slave):
                     self._process.kill()
                 self._end()
                 raise CosimError(
-                    f"{self.name} did not come back from {_told(method, arguments)} within {self._patience:g} s; its "
-                    "process was ended."
+                    f"{self.name} did not come back from {told} within {self._patience:g} s; its process was ended."
                 )
             done, answer = self._connection.recv()
         except (EOFError, OSError) as error:
-            raise CosimError(f"{self.name} {self._how_it_ended()} in {_told(method, arguments)}.") from error
+            raise CosimError(f"{self.name} {self._how_it_ended()} in {told}.") from error
         if not done:
             misfit, message = answer
             raise (MisfitError if misfit else CosimError)(message)
@@ -214,6 +228,8 @@ class IsolatedSlave(Slave):
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
 
 
 def _told(method: str, arguments: tuple[Any, ...]) -> str:

@@ -5,16 +5,12 @@ from __future__ import annotations
 import csv
 import io
 import os
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from cosim.errors import CosimError
 from cosim.result import CosimResult
-
-AT_ONCE = 0.1
-"""Seconds after which rows are written at the latest."""
 
 
 class Columns:
@@ -45,23 +41,22 @@ class Columns:
 
 
 class RowFile:
-    """A file that each row of a run is added to, by whole lines.
+    """A file that each row of a run is added to when it is known, by a whole line: whatever ends the process next.
 
     Parameters
     ----------
     path : str or Path
-        Its folder is made if there is none.
+        It is written anew with the first row, and its folder made if there is none: a call that is refused before
+        leaves the results of an earlier one.
     columns : Columns
     """
 
     def __init__(self, path: str | Path, columns: Columns) -> None:
         self._path, self._columns = Path(path), columns
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = self._path.open("wb", buffering=0)
+        self._file: io.FileIO | None = None
         self._lines = io.StringIO()
         self._writer = csv.writer(self._lines)
-        self._written, self._last, self._rows = 0, time.monotonic(), 0
-        self._writer.writerow(["time", *columns.names])
+        self._written = 0
 
     def take(self, result: CosimResult) -> None:
         """Add the last row of a result.
@@ -70,35 +65,36 @@ class RowFile:
         ------
         CosimError
             If it cannot be written, as on a full disk; the file ends with a whole line all the same.
+        OSError
+            If there can be no such file.
         """
+        if self._file is None:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = io.FileIO(self._path, "wb")
+            self._writer.writerow(["time", *self._columns.names])
         row = [values[-1] for values in result.signals.values()]
         self._writer.writerow([result.times[-1], *self._columns.cells(row)])
-        self._rows += 1
-        if time.monotonic() - self._last > AT_ONCE:
-            self._write(result.times[-1])
+        self._write(self._file, result.times[-1])
 
     def close(self) -> None:
-        """Write what is left, and close the file."""
-        try:
-            self._write(None)
-        finally:
+        """Close the file."""
+        if self._file is not None:
             self._file.close()
 
-    def _write(self, t: float | None) -> None:
+    def _write(self, file: io.FileIO, t: float) -> None:
         content = self._lines.getvalue().encode()
         self._lines.seek(0)
         self._lines.truncate()
-        self._last = time.monotonic()
         done = 0
         try:
             while done < len(content):
-                done += self._file.write(content[done:]) or 0
+                done += file.write(content[done:]) or 0
         except OSError as error:
             whole = content[:done].rfind(b"\n") + 1
-            os.ftruncate(self._file.fileno(), self._written + whole)
-            at = "" if t is None else f" at t = {t:.9g} s"
+            os.ftruncate(file.fileno(), self._written + whole)
             raise CosimError(
-                f"{self._path} cannot be written any further{at}: {error.strerror}. What is there can be read."
+                f"{self._path} cannot be written any further at t = {t:.9g} s: {error.strerror}. What is there can be "
+                "read: make room, or write it elsewhere."
             ) from error
         self._written += done
 

@@ -11,7 +11,7 @@
 #include "fmi3Functions.h"
 
 enum { WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS, HANGS, ABORTS, ITERATES,
-       PASTS, BEYOND, BACKWARD, THRICE };
+       PASTS, BEYOND, BACKWARD, THRICE, LEAVES, BLINDED };
 enum { X = 1, COUNT, RATE, ENDS, BEHAVIOUR, ANNOUNCES, SIZE, WEIGHTS, TOTAL, STEPS, SENT, HEARD, GAIN, GAINED, PULSE,
        FIRST_ECHO = 20, ECHOES = 40 };
 enum { MOST = 100 };
@@ -66,7 +66,12 @@ fmi3Instance fmi3InstantiateCoSimulation(
     return b;
 }
 
-void fmi3FreeInstance(fmi3Instance i) { free(i); }
+void fmi3FreeInstance(fmi3Instance i)
+{
+    if (((Block *)i)->behaviour == LEAVES)
+        abort();
+    free(i);
+}
 fmi3Status fmi3EnterInitializationMode(fmi3Instance i, fmi3Boolean has_tolerance, fmi3Float64 tolerance,
                                        fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop)
 {
@@ -198,6 +203,8 @@ fmi3Status fmi3GetFloat64(fmi3Instance i, const fmi3ValueReference r[], size_t n
 {
     Block *b = i;
     double sum = 0.0;
+    if (b->behaviour == BLINDED && b->next > 0.45)
+        abort();
     for (uint64_t k = 0; k < b->size; k++)
         sum += b->weights[k];
     for (size_t j = 0; j < n; j++, v++, m--) {

@@ -1,10 +1,15 @@
 """FMUs in processes of their own: the same runs, and one that crashes or hangs is named with its last call."""
 
 import csv
+import os
+import signal
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
-from strangers import ABORTS, DIES, HANGS
+from strangers import ABORTS, BLINDED, DIES, HANGS, LEAVES
 
 from cosim.cli.main import main
 from cosim.errors import CosimError, MisfitError
@@ -45,6 +50,7 @@ def test_a_run_is_the_same(master, stranger):
     [
         (DIES, r"b ended its process \(status 7\) in step\(0, 0.1\)"),
         (ABORTS, r"b crashed \(SIGABRT\) in step\(0.5, 0.6\)"),
+        (BLINDED, r"b crashed \(SIGABRT\) in reading x, count, total and 16 more"),
         (HANGS, r"b did not come back from step\(0, 0.1\) within 0.5 s; its process was ended"),
     ],
 )
@@ -54,7 +60,7 @@ def test_one_that_fails_is_named_and_the_others_are_freed(behaviour, sentence, s
     slaves[1]._patience = 0.5 if behaviour == HANGS else 60.0
     began = time.monotonic()
     with pytest.raises(CosimError, match=sentence):
-        run_fixed_step(System(slaves, {}), 1.0, 0.1)
+        run_fixed_step(System(slaves, {}), 1.0, 0.1, record=[f"b.{name}" for name in slaves[1].outputs])
     assert [slave._process for slave in slaves] == [None, None]
     assert time.monotonic() - began < 30.0
     with pytest.raises(CosimError, match=r"b: its process is gone, so get\('x'\) cannot be called"):
@@ -79,3 +85,36 @@ def test_errors_arrive_as_they_are(stranger, tmp_path):
     slave.close()
     with pytest.raises(CosimError, match="there is no file"):
         IsolatedSlave("it", tmp_path / "none.fmu")
+
+
+def test_one_that_crashes_when_it_is_freed_has_given_its_results(stranger, capsys):
+    path = stranger(events=False, experiment='stopTime="2" stepSize="0.1"')
+    assert main(["cosim", str(path), "--isolate", "--start-value", f"behaviour={LEAVES}"]) == 0
+    said = capsys.readouterr()
+    assert "reached t = 2 s" in said.out
+    assert "stranger crashed (SIGABRT) in close(). The run was over, and its results are whole." in said.err
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc")
+def test_a_killed_run_leaves_no_process_and_no_folder_though_an_fmu_hangs(stranger, tmp_path):
+    path, table, places = stranger(events=False), tmp_path / "out.csv", tmp_path / "temporary"
+    places.mkdir()
+    command = ["cosim", str(path), "--isolate", "--start-value", f"behaviour={HANGS}", "--output-file", str(table)]
+    program = "import sys; from cosim.cli.main import main; main(sys.argv[1:])"
+    run = subprocess.Popen([sys.executable, "-c", program, *command], env={**os.environ, "TMPDIR": str(places)})
+    await_true(lambda: table.exists() and table.stat().st_size > 0)
+    children = Path(f"/proc/{run.pid}/task/{run.pid}/children").read_text().split()
+    assert children
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    await_true(lambda: not any(Path(f"/proc/{child}").exists() for child in children))
+    await_true(lambda: not any(places.iterdir()))
+    with table.open(newline="") as file:
+        assert [float(row["time"]) for row in csv.DictReader(file)] == [0.0]
+
+
+def await_true(happened):
+    began = time.monotonic()
+    while not happened():
+        assert time.monotonic() - began < 60.0
+        time.sleep(0.02)

@@ -136,8 +136,7 @@ def test_a_vector_is_one_column():
     assert table.cells([1.0, 0.1, True]) == ["1.0 0.1", 1]
 
 
-def test_rows_are_there_while_the_run_goes_on(tmp_path, monkeypatch):
-    monkeypatch.setattr("cosim.tables.row_file.AT_ONCE", -1.0)
+def test_rows_are_there_while_the_run_goes_on(tmp_path):
     rows, result = RowFile(tmp_path / "new" / "out.csv", Columns(["x"], {}, {})), CosimResult()
     result.watch = rows.take
     result.keep(0.0, ["x"], [1.5])
@@ -145,8 +144,13 @@ def test_rows_are_there_while_the_run_goes_on(tmp_path, monkeypatch):
     rows.close()
 
 
-def test_a_full_disk_leaves_whole_lines(tmp_path, monkeypatch):
-    monkeypatch.setattr("cosim.tables.row_file.AT_ONCE", -1.0)
+def test_a_call_that_is_refused_leaves_the_results_of_an_earlier_one(echo, tmp_path):
+    out = written(tmp_path / "out.csv", "time,x\n0,1\n")
+    assert main(["cosim", str(echo), "--output-file", str(out), "--output-interval", "0.3"]) == 2
+    assert out.read_text() == "time,x\n0,1\n"
+
+
+def test_a_full_disk_leaves_whole_lines(tmp_path):
     rows, result = RowFile(tmp_path / "out.csv", Columns(["x"], {}, {})), CosimResult()
     result.watch = rows.take
     result.keep(0.0, ["x"], [1.0])

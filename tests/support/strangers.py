@@ -5,6 +5,7 @@ import zipfile
 import fmpy
 
 WELL, STALLS, REPEATS, CREEPS, DIES, FAILS, PANTS, HANGS, ABORTS, ITERATES, PASTS, BEYOND, BACKWARD, THRICE = range(14)
+LEAVES, BLINDED = 14, 15
 """Behaviours of `stranger3.c`."""
 TYPES = {
     "Float64": 'min="-0.1" max="1e6"',
