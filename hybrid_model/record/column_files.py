@@ -46,6 +46,8 @@ def write_columns(
     ------
     DataError
         For a name with another ending.
+    OSError
+        With the name of the file, as on a full disk.
     """
     path = Path(path)
     require_ending(path)
@@ -76,6 +78,9 @@ def replaced(path: Path) -> Iterator[Path]:
     try:
         yield part
         part.replace(path)
+    except OSError as error:
+        # Whoever writes knows the part, or no name at all.
+        raise OSError(error.errno, error.strerror or str(error), str(path)) from error
     finally:
         part.unlink(missing_ok=True)
 

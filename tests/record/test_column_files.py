@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -98,3 +99,19 @@ def test_other_endings_are_refused_before_the_run(tmp_path, capsys, monkeypatch)
         assert "ends in '.xlsx': tables are written as .csv, .npz, .mat, .nc; give one" in capsys.readouterr().err
     with pytest.raises(hm.DataError, match=r"ends in '\.xlsx'"):
         write_columns(tmp_path / "a.xlsx", COLUMNS)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of processes")
+@pytest.mark.parametrize("ending", [".csv", ".npz", ".mat"])
+def test_a_file_that_does_not_fit_is_named_and_nothing_of_it_is_left(ending, tmp_path):
+    import resource
+
+    path, limits = tmp_path / f"run{ending}", resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
+    try:
+        with pytest.raises(OSError, match="too large") as raised:
+            write_columns(path, {"time": np.linspace(0.0, 1.0, 10_000)})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert raised.value.filename == str(path)
+    assert list(tmp_path.iterdir()) == []
