@@ -6,6 +6,7 @@ uniform numbers in [0, 1) are taken from the generator (NumPy's PCG64), so a see
 
 import enum
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
 
 import networkx as nx
@@ -75,7 +76,7 @@ def random_dwell_sequence(
             return (graph + 1) % len(graphs)
         return (graph + 1 + int(draw() * (len(graphs) - 1))) % len(graphs)
 
-    return _draw(graphs, edge_count, 0, following, _dwell(shortest, longest, draw), duration, repeat)
+    return _draw(graphs, edge_count, 0, following, _dwell(shortest, longest, draw), longest, duration, repeat)
 
 
 def markov_sequence(
@@ -122,14 +123,15 @@ def markov_sequence(
     if not 1 <= first <= len(graphs):
         raise ValueError(f"first is {first}; graphs are numbered from 1 to {len(graphs)}.")
     draw = _uniform(seed)
-    cumulative = np.cumsum(matrix, axis=1)
+    cumulative = np.cumsum(matrix, axis=1).tolist()
+    # The last positive chance takes what rounding leaves of the sum.
+    last = [int(np.flatnonzero(row)[-1]) for row in matrix]
 
     def following(graph: int) -> int:
-        # The last positive chance takes what rounding leaves of the sum.
-        last = int(np.flatnonzero(matrix[graph])[-1])
-        return min(int(np.searchsorted(cumulative[graph], draw(), side="right")), last)
+        return min(bisect_right(cumulative[graph], draw()), last[graph])
 
-    return _draw(graphs, edge_count, first - 1, following, _dwell(shortest, longest, draw), duration, repeat)
+    dwell = _dwell(shortest, longest, draw)
+    return _draw(graphs, edge_count, first - 1, following, dwell, longest, duration, repeat)
 
 
 def jointly_connected_sequence(
@@ -233,10 +235,13 @@ def _draw(
     first: int,
     following: Callable[[int], int],
     dwell: Callable[[], float],
+    longest: float,
     duration: float,
     repeat: bool,
 ) -> SwitchingSequence:
     require("duration", duration, duration > 0, "must be positive")
+    if duration > _MOST_INTERVALS * longest:
+        raise _too_many(duration)
     dwells: list[float] = []
     active: list[tuple[int, ...]] = []
     graph, total = first, 0.0
@@ -249,11 +254,15 @@ def _draw(
         total += length
         graph = following(graph)
         if len(dwells) > _MOST_INTERVALS:
-            raise ValueError(
-                f"duration is {duration:.6g} s, for which more than {_MOST_INTERVALS} intervals are drawn; choose it "
-                "shorter, or longer intervals (shortest, longest)."
-            )
+            raise _too_many(duration)
     return SwitchingSequence(tuple(dwells), tuple(active), edge_count, repeat)
+
+
+def _too_many(duration: float) -> ValueError:
+    return ValueError(
+        f"duration is {duration:.6g} s, for which more than {_MOST_INTERVALS} intervals are drawn; choose it "
+        "shorter, or longer intervals (shortest, longest)."
+    )
 
 
 def _dwell(shortest: float, longest: float, draw: Callable[[], float]) -> Callable[[], float]:
