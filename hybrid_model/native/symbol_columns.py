@@ -6,6 +6,7 @@ used again as long as the array holds these very elements.
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -83,7 +84,7 @@ def at_once(
         The result, in both forms. None where it has to be computed element by element.
     """
     shape = np.broadcast_shapes(*(array.shape for array in given))
-    size = int(np.prod(shape))
+    size = math.prod(shape)
     if size < FEWEST:
         return None
     columns = []

@@ -73,6 +73,7 @@ _ELEMENTWISE: dict[np.ufunc, Callable[..., Any]] = {
     np.bitwise_or: ca.logic_or,
     np.invert: ca.logic_not,
 }
+_ONE_BY_ONE = {ufunc: np.frompyfunc(operation, ufunc.nin, 1) for ufunc, operation in _ELEMENTWISE.items()}
 _IDENTITY = {np.add: 0.0, np.multiply: 1.0, np.logical_and: True, np.logical_or: False}
 
 
@@ -97,7 +98,7 @@ class Symbols(np.ndarray[Any, np.dtype[Any]]):
                 f"np.{ufunc.__name__} ({method}) cannot be traced: write it with arithmetic, np.where, np.minimum, "
                 "np.maximum and the elementary functions."
             )
-        elementwise = np.frompyfunc(operation, ufunc.nin, 1)
+        elementwise = _ONE_BY_ONE[ufunc]
         if method == "__call__":
             return _elementwise(operation, elementwise, inputs, range(ufunc.nin))
         given = [_plain(value) for value in inputs]
@@ -149,16 +150,22 @@ def _where(*args: Any) -> Symbols:
     if len(args) != 3:
         raise TraceError("np.where with a condition only asks for indices: give np.where(condition, a, b).")
     # Which of two numbers a traced condition chooses is an expression all the same.
-    return _elementwise(ca.if_else, np.frompyfunc(ca.if_else, 3, 1), args, range(1))
+    return _elementwise(ca.if_else, _CHOOSE, args, range(1))
+
+
+_CHOOSE = np.frompyfunc(ca.if_else, 3, 1)
 
 
 def _elementwise(
     operation: Callable[..., Any], one_by_one: Callable[..., Any], given: Sequence[Any], deciding: Sequence[int]
 ) -> Symbols:
     """Apply an operation to arrays, all elements at once if that can be."""
-    found = at_once(operation, [value if isinstance(value, Symbols) else _plain(value) for value in given], deciding)
+    arrays = [value if isinstance(value, Symbols) else _plain(value) for value in given]
+    if not any(array.ndim for array in arrays):
+        return symbols(operation(*(array.item() for array in arrays)))
+    found = at_once(operation, arrays, deciding)
     if found is None:
-        return symbols(one_by_one(*(_plain(value) for value in given)))
+        return symbols(one_by_one(*(_plain(value) for value in arrays)))
     elements, column = found
     result = elements.view(Symbols)
     result.column = column
