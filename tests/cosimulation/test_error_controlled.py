@@ -136,7 +136,7 @@ def _rows(result, t, name):
     return [value for time, value in zip(result.times, result.signals[name], strict=True) if time == t]
 
 
-@pytest.mark.parametrize("name", ["static", "dynamic"])
+@pytest.mark.parametrize("name", ["static", pytest.param("dynamic", marks=pytest.mark.long)])
 def test_jumps_inside_fmus_have_both_rows(name, tmp_path, capsys):
     """The agents as FMI 2.0, which have jumped when their steps end, beside those of 3.0: at jumps both sides count."""
     table = tmp_path / "run.csv"
