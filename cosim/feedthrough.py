@@ -35,7 +35,10 @@ def refuse_loops(system: System) -> None:
     found = _sorted(flows, _leads_by_description(system))
     if isinstance(found, list):
         loop = _listed(list(map(str, found)))
-        raise CosimError(f"{loop} depend on each other at once, in a loop. Break it by a state, or have it iterated.")
+        raise CosimError(
+            f"{loop} depend on each other at once, in a loop. Break it by a state, or have it iterated "
+            "(--loop-iterations 100)."
+        )
 
 
 def told_loop(unsettled: Mapping[Connection, str]) -> str:

@@ -100,6 +100,9 @@ class FmuSlave(Slave):
             raise MisfitError(f"{full_name} is a structural parameter: set it before the run.")
         if self._begun and variable.causality == "parameter" and name not in self.tunable:
             raise MisfitError(f"{full_name} is a parameter that is not tunable: set it before the run.")
+        if self._access is None and (variable.initial == "calculated" or variable.variability == "constant"):
+            what = "constant" if variable.variability == "constant" else "computed by the FMU (initial: calculated)"
+            raise MisfitError(f"{full_name} is {what}: set parameters, inputs and start values of states instead.")
         try:
             held = exact(variable, value, full_name)
             if self._access is None or (variable.causality == "parameter" and name in self.tunable):

@@ -6,6 +6,7 @@ import weakref
 from abc import abstractmethod
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +14,9 @@ from cosim.errors import CosimError, MisfitError
 from cosim.measure import Measure
 from fmu.importer.values import Value
 from hybrid_model.schedule.blocks import Block
+
+SHOWN = 20
+"""Most names of variables in a message."""
 
 
 @dataclass(frozen=True)
@@ -191,7 +195,11 @@ class Slave(Block):
 
     def unknown(self, name: str) -> MisfitError:
         """Return the error for a name that the block does not have."""
-        return MisfitError(f"{self.name} has no variable {name!r}; it has {', '.join(self.variable_names)}.")
+        names = self.variable_names
+        near = get_close_matches(name, names, 1)
+        meant = f" Did you mean {near[0]}?" if near else ""
+        more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
+        return MisfitError(f"{self.name} has no variable {name!r}; it has {', '.join(names[:SHOWN])}{more}.{meant}")
 
     @property
     @abstractmethod

@@ -14,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli.exits import Exit, exit_of, given_values
+from cosim.cli.options.cosimulate import ORDERS
 from cosim.cli.outputs import results_folder
 from cosim.cli.progress import Work
 from cosim.cli.run_files import RunFiles
 from cosim.cli.step_study import study
 from cosim.cli.system_fmus import with_fmus
 from cosim.consensus import fmu_system
-from cosim.errors import CosimError, MisfitError, TimesError, UsageError
+from cosim.errors import CosimError, GivenValueError, MisfitError, TimesError, UsageError
 from cosim.isolation.isolated_slave import IsolatedSlave
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
@@ -136,8 +137,9 @@ def _slips_of(options: argparse.Namespace) -> Iterator[None]:
         yield
     except MisfitError as error:
         written = Path(options.system)
-        if written.is_dir() or written.suffix.lower() in (".toml", ".ssp"):
-            raise UsageError(str(error)) from error
+        if written.is_dir() or written.suffix.lower() in (".toml", ".ssp", ".ssd"):
+            told = str(error)
+            raise UsageError(told if told.startswith(str(written)) else f"{written}: {told}") from error
         raise
 
 
@@ -253,6 +255,8 @@ def _run(system: System, options: argparse.Namespace, experiment: Experiment) ->
     files = RunFiles(options, system, experiment.stop_time)
     try:
         result = _master(system, options, experiment, inputs, files)
+    except GivenValueError as error:
+        raise GivenValueError(f"{options.input_file}: {error}") from error
     except (CosimError, KeyboardInterrupt):
         if files.result is not None and options.output_file:
             print(
@@ -289,6 +293,13 @@ def _master(
     able = all(slave.can_restore and slave.variable_step and slave.internal_step is None for slave in slaves)
     controlled = able and bool(system.connections)
     master = experiment.master or (EVENT_EXACT if exact else ERROR_CONTROLLED if controlled else FIXED_STEP)
+    _tell_unused(options, master)
+    if master == EVENT_EXACT and curves:
+        curve = next(name for name, given in inputs.items() if isinstance(given, Curve))
+        raise UsageError(
+            f"the event-exact master sets inputs at events only, and {curve} of {options.input_file} changes between "
+            "its rows: leave the master out, or choose another one."
+        )
     if master == FIXED_STEP:
         step = _part(t_stop - t_start, STEP) if proposed is None else proposed
         return run_fixed_step(
@@ -300,10 +311,8 @@ def _master(
             output_interval=experiment.output_interval,
             inputs=inputs,
             watch=files.watch,
-            order=options.order,
+            order=options.order or ORDERS[0],
         )
-    if options.step_size is not None:
-        print(f"hybrid-fmu: --step-size is for the fixed-step master; this run is {master}.", file=sys.stderr)
     # A step is proposed for masters that need short ones; here it is the output that it would make long.
     dense = proposed is not None and t_stop - t_start > MOST * proposed
     interval = experiment.output_interval
@@ -330,6 +339,17 @@ def _master(
         inputs=inputs,
         watch=files.watch,
     )
+
+
+def _tell_unused(options: argparse.Namespace, master: str) -> None:
+    """Say which options are for another master."""
+    for option, given, of in (
+        ("--step-size", options.step_size, FIXED_STEP),
+        ("--order", options.order, FIXED_STEP),
+        ("--tolerance", options.tolerance, ERROR_CONTROLLED),
+    ):
+        if given is not None and master != of:
+            print(f"hybrid-fmu: {option} is for the {of} master; this run is {master}.", file=sys.stderr)
 
 
 def _part(length: float, wanted: float) -> float:

@@ -81,8 +81,15 @@ def set_start(slave: Slave, name: str, value: Any) -> None:
         slave.set(name, slave.parse(name, value) if isinstance(value, str) else value)
         return
     elements = [own for own in slave.variable_names if own.startswith(f"{name}[")]
+    if not elements:
+        if name not in slave.variable_names:
+            raise slave.unknown(name)
+        raise MisfitError(f"{slave.name}.{name} is no array, but is given a list of {len(value)}: give one value.")
     if len(elements) != len(value):
-        raise MisfitError(f"{slave.name}.{name} has {len(elements)} elements, but {len(value)} values are given.")
+        raise MisfitError(
+            f"{slave.name}.{name} has {len(elements)} elements, {elements[0]} to {elements[-1]}, but is given a list "
+            f"of {len(value)}: give one for each, row by row."
+        )
     for element, part in zip(elements, value, strict=True):
         set_start(slave, element, part)
 

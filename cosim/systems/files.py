@@ -14,7 +14,7 @@ IN_FOLDER = "system.toml"
 
 
 def read_system(path: str | Path) -> SystemDefinition | None:
-    """Read a system from a TOML file, an SSP file, a folder with one, or an FMU, which is a system of one component.
+    """Read a system from a TOML file, an SSP file or its description, a folder with one, or an FMU, a system by itself.
 
     Returns
     -------
@@ -33,6 +33,8 @@ def read_system(path: str | Path) -> SystemDefinition | None:
         return SystemDefinition(path.stem, [Component(path.stem, FMU, str(path))])
     if path.suffix.lower() == ".ssp":
         return read_ssp(path)
+    if path.suffix.lower() == ".ssd":
+        return read_ssd(path)
     if path.suffix.lower() == ".toml" and is_system(path):
         return read_toml(path)
     return None

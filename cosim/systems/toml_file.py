@@ -51,7 +51,7 @@ def read_toml(path: str | Path) -> SystemDefinition:
     inputs = _table(path, document, "inputs")
     _require_known(path, "inputs.", inputs, ("file",))
     return SystemDefinition(
-        str(document.get("name", path.stem)),
+        _text(path, "name", document.get("name", path.stem)),
         components,
         connections,
         _inputs(path, inputs),
@@ -111,7 +111,9 @@ def _component(path: Path, folder: Path, name: str, entry: Any) -> Component:
             "out, or export the automaton and name its FMU."
         )
     if kinds[0] == FMU:
-        _require_file(path, f"{where}.fmu", Path(source))
+        _require_file(path, f"{where}.fmu", entry[FMU], Path(source))
+    if kinds[0] == FMU and "arguments" in entry:
+        raise MisfitError(f"{path}: {where}.arguments are for the class of an automaton: values of FMUs are in start.")
     start, arguments = (_table(path, entry, key, f"{where}.") for key in ("start", "arguments"))
     for variable, value in start.items():
         _require_value(path, f"{where}.start.{variable}", value)
@@ -146,14 +148,14 @@ def _inputs(path: Path, table: Mapping[str, Any]) -> Path | None:
     if "file" not in table:
         return None
     file = path.parent / _text(path, "inputs.file", table["file"])
-    _require_file(path, "inputs.file", file)
+    _require_file(path, "inputs.file", table["file"], file)
     return file
 
 
-def _require_file(path: Path, where: str, file: Path) -> None:
+def _require_file(path: Path, where: str, given: str, file: Path) -> None:
     if not file.is_file():
         raise MisfitError(
-            f"{path}: {where} is {file}, and there is no such file: give its path, from the folder of this one."
+            f"{path}: {where} is {given!r}, and there is no such file: give its path, from the folder of this one."
         )
 
 

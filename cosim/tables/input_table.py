@@ -6,16 +6,18 @@ import bisect
 import csv
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from cosim.errors import MisfitError
 from cosim.masters.changes import Curve, Given
 from cosim.slave import Slave
 from cosim.system import System
 from hybrid_model import Signal
+
+T = TypeVar("T")
 
 
 def read_inputs(path: str | Path, system: System) -> dict[str, Given]:
@@ -44,8 +46,8 @@ def read_inputs(path: str | Path, system: System) -> dict[str, Given]:
     inputs: dict[str, Given] = {}
     for name, texts in columns.items():
         for full_name, elements in _elements(system, path, name, texts):
-            slave, variable = system.settable(full_name)
-            inputs[full_name] = _given(system.slaves[slave], variable, times, elements)
+            slave, variable = _named(path, system.settable, full_name)
+            inputs[full_name] = _given(path, system.slaves[slave], variable, times, elements)
     return inputs
 
 
@@ -62,6 +64,8 @@ def read_columns(path: str | Path) -> tuple[list[float], dict[str, list[str]]]:
             rows = [row for row in csv.reader(file) if row]
     except (UnicodeDecodeError, csv.Error) as error:
         raise MisfitError(f"{path} is no file of comma-separated values in UTF-8: {error}.") from error
+    if rows and len(rows[0]) == 1 and ";" in rows[0][0]:
+        raise MisfitError(f"{path}: its columns are separated by ';': separate them by ',', and write numbers as 0.5.")
     if len(rows) < 2 or _name(rows[0][0]) not in ("time", "t"):
         raise MisfitError(f"{path} has no line of names that begins with time, and a row below it: give them.")
     names = [_name(field) for field in rows[0]]
@@ -95,7 +99,7 @@ def _time(path: str | Path, line: int, text: str) -> float:
 def _elements(system: System, path: str | Path, name: str, texts: Sequence[str]) -> list[tuple[str, Sequence[str]]]:
     """Return the scalars of a column: their full names, and their values as texts."""
     full_name = system.full_name(name)
-    elements = system.elements(full_name)
+    elements = _named(path, system.elements, full_name)
     if not elements:
         return [(full_name, texts)]
     rows = [text.split() for text in texts]
@@ -107,14 +111,32 @@ def _elements(system: System, path: str | Path, name: str, texts: Sequence[str])
     return [(element, [row[k] for row in rows]) for k, element in enumerate(elements)]
 
 
-def _given(slave: Slave, name: str, times: Sequence[float], texts: Sequence[str]) -> Given:
-    values = [slave.parse(name, text.strip() if _is_number(slave, name) else text) for text in texts]
+def _named(path: str | Path, ask: Callable[[str], T], name: str) -> T:
+    """Return what a system says of a name; a refusal names the file."""
+    try:
+        return ask(name)
+    except MisfitError as error:
+        raise MisfitError(f"{path}: {error}") from error
+
+
+def _given(path: str | Path, slave: Slave, name: str, times: Sequence[float], texts: Sequence[str]) -> Given:
+    values = [_value(path, row, slave, name, text) for row, text in enumerate(texts, start=2)]
     port = slave.inputs.get(name)
     if port is not None and not port.discrete:
         line = Polyline(tuple(times), tuple(float(value) for value in values))
         return Curve(line, line.jumps)
     steps = Staircase(tuple(times), tuple(values))
     return Signal(steps, steps.jumps)
+
+
+def _value(path: str | Path, row: int, slave: Slave, name: str, text: str) -> Any:
+    try:
+        value = slave.parse(name, text.strip() if _is_number(slave, name) else text)
+    except MisfitError as error:
+        raise MisfitError(f"{path}, row {row}: {error}") from error
+    if isinstance(value, float) and not math.isfinite(value):
+        raise MisfitError(f"{path}, row {row}: {slave.name}.{name} is set to {value}: give a finite number.")
+    return value
 
 
 def _is_number(slave: Slave, name: str) -> bool:

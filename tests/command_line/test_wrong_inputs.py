@@ -42,6 +42,10 @@ class Shown(hm.HybridAutomaton):
     y = hm.Output()
     def flow_map(self, s): return {"h": 0.0}
     def outputs(self, s): return {"y": s.h}
+class Driven(hm.HybridAutomaton):
+    h = hm.State(1.0, output=True)
+    u = hm.Input(0.0)
+    def flow_map(self, s): return {"h": s.u}
 """
 TEXTS = {
     "small.toml": S,
@@ -55,6 +59,17 @@ TEXTS = {
     "sys3.toml": '[components.a]\nautomaton = "hybrid_model.models:BouncingBall"\n[connections]\n"a.u" = "a.h"\n',
     "sys4.toml": '[components.a]\nautomaton = "shown.py:Shown"\n',
     "sys5.toml": '[components.a]\nautomaton = "ball.py:Ball"\ninterface = "cs"\n',
+    "sys6.toml": '[components.a]\nautomaton = "shown.py:Shown"\nstart.h = [1, 2]\n',
+    "sys7.toml": '[components.a]\nautomaton = "shown.py:Shown"\n[connections]\n"b.u" = "a.h"\n',
+    "sys8.toml": '[components.a]\nfmu = ""\n',
+    "sys9.toml": '[components.a]\nfmu = "text.fmu"\narguments.x = 1\n',
+    "sys10.toml": 'name = 3\n[components.a]\nfmu = "text.fmu"\n',
+    "sys11.toml": '[components.a]\nautomaton = "shown.py:Driven"\n',
+    "lone.ssd": "<x/>",
+    "semi.csv": "time;u\n0;1\n",
+    "nan.csv": "time,u\n0,1\n1,nan\n",
+    "text.csv": "time,u\n0,x\n",
+    "line.csv": "time,u\n0,0\n1,1\n",
     "run.csv": "time,x\n0,1\n",
     "bad.sqlite": "nothing",
     "file": "",

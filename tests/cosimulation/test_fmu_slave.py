@@ -329,3 +329,24 @@ def test_nothing_is_left_of_an_fmu_that_ends_the_process(other, tmp_path):
             break
         time.sleep(0.05)
     assert list(place.iterdir()) == []
+
+
+class Doubles(hm.HybridAutomaton):
+    x = hm.State(1.0, output=True)
+    y = hm.Output()
+
+    def flow_map(self, s):
+        return {"x": 0.0}
+
+    def outputs(self, s):
+        return {"y": 2.0 * s.x}
+
+
+@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+def test_what_an_fmu_computes_is_no_start_value(fmi, exported):
+    slave = FmuSlave("it", exported(Doubles(), "doubles", fmi))
+    slave.set("x", 3.0)
+    with pytest.raises(MisfitError, match=r"it\.y is computed by the FMU \(initial: calculated\): set parameters"):
+        slave.set("y", 3.0)
+    with pytest.raises(MisfitError, match=r"it\.der\(x\) is computed by the FMU"):
+        slave.set("der(x)", 3.0)

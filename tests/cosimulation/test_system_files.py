@@ -156,7 +156,7 @@ def test_what_makes_no_sense_is_refused_with_the_entry(old, new, sentence, folde
             r"sum.many has 2 elements, \[1\] to \[2\], but is given a list of 1",
         ),
         ('"blocks.py:Sum"', '"blocks.py:Sum"\nstart.total = 1.0', "sum.total is an output that the automaton computes"),
-        ("count = 10", "count = [10]", "b.count has 0 elements, but 1 values are given"),
+        ("count = 10", "count = [10]", "b.count is no array, but is given a list of 1: give one value"),
     ],
 )
 def test_what_does_not_fit_is_refused(old, new, sentence, folder):

@@ -12,6 +12,7 @@ from cosim.cli.options.values import (
     part,
     positive,
     require_file,
+    require_folder,
     require_scenario,
     require_table,
     seconds,
@@ -34,7 +35,7 @@ PATIENCE = 60.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     parser.add_argument(
-        "system", metavar="SYSTEM", help="an .fmu, .ssp, a system's .toml, a folder with one, or a scenario"
+        "system", metavar="SYSTEM", help="an .fmu, .ssp, .ssd, a system's .toml, a folder with one, or a scenario"
     )
     parser.add_argument(
         "--master",
@@ -58,8 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--order",
         choices=ORDERS,
-        default=ORDERS[0],
-        help="of the fixed-step master, see docs/cosimulation.md (default: %(default)s)",
+        help=f"of the fixed-step master, see docs/cosimulation.md (default: {ORDERS[0]})",
     )
     parser.add_argument(
         "--start-time", type=number, metavar="S", help="start of the run in s (default: what an .fmu proposes, or 0)"
@@ -146,11 +146,26 @@ def require_named(options: argparse.Namespace) -> None:
                 f"--stop-time {options.stop_time:g}: the run starts at {start:g} s; give the stop after the start."
             )
     require_table(options.output_file)
+    for file in (options.output_file, options.event_log, options.plot):
+        require_folder(None if file is None else file.parent)
+    if options.event_log is not None and options.event_log.is_dir():
+        raise UsageError(f"{options.event_log} is a folder: give the path of the table of events, such as events.csv.")
+    _require_target(options.save_as)
     if options.plot is not None and options.plot.suffix.lower() not in (".png", ".pdf", ".svg", ".pgf"):
         raise UsageError(f"{options.plot}: pictures are .png, .pdf, .svg or .pgf files; give one of these endings.")
     for file in (options.input_file, options.reference_file):
         if file is not None:
             require_file(file, "a table of comma-separated values")
+
+
+def _require_target(given: Path | None) -> None:
+    """Refuse what is neither the name of an SSP file nor of a folder."""
+    if given is None or given.suffix.lower() == ".ssp":
+        require_folder(None if given is None else given.parent)
+    elif given.suffix.lower() in (".ssd", ".fmu", ".zip", ".xml", ".toml", ".csv"):
+        raise UsageError(f"--save-as {given}: give a file that ends in .ssp, or a folder for libcosim.")
+    else:
+        require_folder(given)
 
 
 def _add_files(parser: argparse.ArgumentParser) -> None:
