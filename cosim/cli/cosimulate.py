@@ -158,11 +158,11 @@ def _slips_in_times(options: argparse.Namespace, file: Experiment) -> Iterator[N
     try:
         yield
     except TimesError as error:
-        for name in error.of:
-            if getattr(options, name, None) is not None:
-                raise UsageError(f"--{name.replace('_', '-')}: {error}") from error
-            if getattr(file, name) is not None:
-                raise UsageError(f"{options.system}, {name}: {error}") from error
+        # What is typed is more of a slip than what a file says that may have run before.
+        told = [f"--{name.replace('_', '-')}" for name in error.of if getattr(options, name, None) is not None]
+        told += [f"{options.system}, {name}" for name in error.of if getattr(file, name) is not None]
+        if told:
+            raise UsageError(f"{told[0]}: {error}") from error
         raise
 
 
@@ -255,13 +255,15 @@ def _run(system: System, options: argparse.Namespace, experiment: Experiment) ->
     files = RunFiles(options, system, experiment.stop_time)
     try:
         result = _master(system, options, experiment, inputs, files)
-    except GivenValueError as error:
-        raise GivenValueError(f"{options.input_file}: {error}") from error
-    except (CosimError, KeyboardInterrupt):
+    except (CosimError, KeyboardInterrupt) as error:
         if files.result is not None and options.output_file:
             print(
                 f"  {options.output_file} has what there was up to t = {files.result.times[-1]:.9g} s", file=sys.stderr
             )
+        if isinstance(error, GivenValueError):
+            raise GivenValueError(f"{options.input_file}: {error}") from error
+        if options.master is not None and files.result is None and type(error) is MisfitError:
+            raise UsageError(f"--master {options.master}: {error}") from error
         raise
     finally:
         files.close()

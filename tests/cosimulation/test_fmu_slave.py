@@ -189,7 +189,7 @@ def test_command_line_takes_the_master_that_fits(fmi, master, exported, capsys):
 
 def test_command_line_says_that_fmi2_has_no_event_mode(exported, capsys):
     path = exported(BouncingBall(), "ball", "2.0")
-    assert main(["cosim", str(path), "--stop-time", "1.0", "--master", "event-exact"]) == 1
+    assert main(["cosim", str(path), "--stop-time", "1.0", "--master", "event-exact"]) == 2
     assert "has no event mode" in capsys.readouterr().err
 
 

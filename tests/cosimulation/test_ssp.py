@@ -510,6 +510,7 @@ def test_values_for_what_is_not_there_are_left_out_and_told(heights, tmp_path, c
     parts = {"own": bound(height=250.0, wide=1.0), "outer": bound(inner_deep=1.0)}
     assert heights(**parts) == ([2.5, 2.0], ["inner.rod.wide", "inner.deep"])
     assert main(["cosim", str(tmp_path), "--stop-time", "1"]) == 0
+    assert main(["cosim", str(tmp_path / "SystemStructure.ssd"), "--stop-time", "1"]) == 0
     told = f"{tmp_path} gives values to what is not in it, and they are left out: inner.rod.wide, inner.deep."
     assert f"hybrid-fmu: {told}" in capsys.readouterr().err
 
