@@ -88,7 +88,8 @@ class SspFile:
                 try:
                     found[unit.get("name", "")] = measure_of(base.attrib)
                 except ValueError as error:
-                    raise self.misfit(f"its unit {unit.get('name')!r} is no unit: {error}") from error
+                    told = f"the BaseUnit of its unit {unit.get('name')!r} has an exponent that is no whole number"
+                    raise self.misfit(f"{told}, or a factor or an offset that is no number") from error
         return found
 
     def scale(self, element: Any, told: str) -> tuple[float, float]:

@@ -90,6 +90,8 @@ def _set(root: Any, file: SspFile, units: Mapping[str, Measure]) -> dict[str, Gi
     values: dict[str, Given] = {}
     for parameter in within(root, "Parameters", "Parameter"):
         is_array, name = bool(children(parameter, "Dimension")), parameter.get("name", "")
+        if not name:
+            raise file.misfit("it has a parameter without a name")
         for typed in parameter:
             listed, unit = [element.get("value") for element in children(typed, "Value")], typed.get("unit")
             if None in listed:
@@ -99,6 +101,8 @@ def _set(root: Any, file: SspFile, units: Mapping[str, Measure]) -> dict[str, Gi
                 values[name] = Given(listed if is_array else listed[0], known)
             elif typed.get("value") is not None:
                 values[name] = Given(typed.get("value").split() if is_array else typed.get("value"), known)
+        if name not in values:
+            raise file.misfit(f"its parameter {name!r} has no value")
     return values
 
 

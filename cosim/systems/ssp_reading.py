@@ -179,6 +179,8 @@ class _Reading:
                 name, indices = wire.get(f"{end}Element"), (wire.get(f"{end}Indices") or "").split()
                 if name not in paths:
                     raise file.misfit(f"a connection names {name!r}, which is no component")
+                if not wire.get(f"{end}Connector"):
+                    raise file.misfit(f"a connection of {name or 'the system'} has no {end}Connector")
                 element = f"[{','.join(indices)}]" if indices else ""
                 node: Node = paths[name], f"{wire.get(f'{end}Connector')}{element}"
                 if indices and _is_border(node):

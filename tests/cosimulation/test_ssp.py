@@ -225,6 +225,10 @@ def test_automata_are_written_as_fmus_with_their_values_as_defaults(tmp_path, ca
             "BooleanMappingTransformation, and linear ones",
         ),
         (
+            {"wires": '<ssd:Connection startElement="a" startConnector="y" endElement="a"/>'},
+            "a connection of a has no endConnector",
+        ),
+        (
             {"wires": '<ssd:Connection startElement="z" startConnector="y" endElement="a" endConnector="heard"/>'},
             "a connection names 'z', which is no component",
         ),
@@ -503,6 +507,18 @@ def test_a_value_may_have_several_targets_and_what_a_mapping_does_not_name_is_no
     twice = mapped(("long", "height", "", ""), ("wide", "height", "", ""))
     with pytest.raises(MisfitError, match="the mapping of wide has the target height, which another entry has too"):
         heights(own=bound(twice, long=250.0, wide=1.0))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('value="250.0"', "", "its parameter 'height' has no value"),
+        ('name="height"', "", "it has a parameter without a name"),
+    ],
+)
+def test_parameters_without_a_name_or_a_value_are_refused(old, new, sentence, heights):
+    with pytest.raises(MisfitError, match=sentence):
+        heights(own=bound(height=250.0).replace(old, new))
 
 
 def test_values_for_what_is_not_there_are_left_out_and_told(heights, tmp_path, capsys):
