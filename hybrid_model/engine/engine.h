@@ -156,6 +156,8 @@ bool engine_predict(Engine *engine, double limit, double *event_time);
 bool engine_look_ahead(Engine *engine, double limit, double *event_time);
 /* Goes on where the last look ahead has ended for want of steps, as many further. */
 bool engine_look_further(Engine *engine, double limit, double *event_time);
+/* Where the look ahead that was made last, by this engine, has found that the run ends: it is over there. */
+void engine_end_ahead(Engine *engine);
 /* Whether the last prediction, still valid, is of an event. */
 bool engine_foresees(const Engine *engine);
 /* The earliest time event after now; breakpoints of the flow only if asked for. */

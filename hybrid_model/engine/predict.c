@@ -86,6 +86,13 @@ bool engine_look_further(Engine *engine, double limit, double *event_time)
     return foresee(engine, limit, look_ahead_steps(engine), event_time);
 }
 
+void engine_end_ahead(Engine *engine)
+{
+    engine_copy_point(engine, &engine->predicted, &engine->live);
+    engine->view = VIEW_NONE;
+    engine_end_run(engine);
+}
+
 bool engine_foresees(const Engine *engine)
 {
     return engine->model->predictable && engine->status->prediction == PREDICTION_EVENT;

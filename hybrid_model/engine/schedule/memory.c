@@ -226,7 +226,7 @@ static bool parts_are_sound(const Schedule *schedule, const Part *parts)
         const Part *own = &schedule->parts[i], *part = &parts[i];
         const unsigned char *flags[] = {(const unsigned char *)&part->touched, (const unsigned char *)&part->pending,
                                         (const unsigned char *)&part->unsure, (const unsigned char *)&part->far,
-                                        (const unsigned char *)&part->due};
+                                        (const unsigned char *)&part->due, (const unsigned char *)&part->ends};
         if (own->group != part->group || own->member != part->member || !isfinite(part->t) ||
             !isfinite(part->t_event))
             return false;

@@ -161,24 +161,21 @@ static void note(Schedule *schedule, uint32_t i, bool ahead, double next)
     Part *part = &schedule->parts[i];
     double limit = limit_of(schedule, i);
     Prediction found = (Prediction)schedule_at(schedule, i)->status->prediction;
-    part->unsure = part->far = false;
+    part->unsure = part->ends = part->far = false;
     if (ahead && found == PREDICTION_QUIET && next >= limit) {
-        part->halts = 0;
         queue_remove(&schedule->queue, i);
         return;
     }
     part->unsure = ahead && found == PREDICTION_RENEWAL;
     if (found == PREDICTION_EVENT || part->unsure) {
-        part->halts = 0;
         /* An event may be due where a look ahead has ended. */
         queue_put(&schedule->queue, i, ahead ? next : part->t);
         return;
     }
-    /* A run that ends ahead has no time to announce; its step says why it ends, and must be long enough for that:
-       rounding by rounding one would not get on. */
-    double end = ahead ? next : part->t, instant = fmax(schedule_instant(schedule, i, end), engine_time_ulp(end));
-    double beyond = end + ldexp(instant, part->halts < MOST_HALTS ? (int)part->halts++ : MOST_HALTS);
-    queue_put(&schedule->queue, i, fmin(beyond, limit));
+    /* What happens within an instant comes first: it may let the run go on. */
+    double end = ahead ? next : part->t;
+    part->ends = true;
+    queue_put(&schedule->queue, i, fmin(end + schedule_instant(schedule, i, end), limit));
 }
 
 void schedule_predict(Schedule *schedule, uint32_t i)
@@ -186,7 +183,7 @@ void schedule_predict(Schedule *schedule, uint32_t i)
     Part *part = &schedule->parts[i];
     double next;
     schedule->work++;
-    part->unsure = part->far = false;
+    part->unsure = part->ends = part->far = false;
     part->reach = 1.0;
     if (part->t >= limit_of(schedule, i)) {
         queue_remove(&schedule->queue, i);
@@ -207,6 +204,23 @@ void schedule_predict_further(Schedule *schedule, uint32_t i, double most)
         return;
     note(schedule, i, ahead, next);
     part->far = part->unsure && (!(next > known) || ++part->reach >= most);
+}
+
+bool schedule_end_ahead(Schedule *schedule, uint32_t i)
+{
+    Part *part = &schedule->parts[i];
+    double next, known = schedule->queue.times[i];
+    schedule->work++;
+    bool ahead = look(schedule, i, false, part->t, &next);
+    if (needs_another_method(schedule, i))
+        return false;
+    note(schedule, i, ahead, next);
+    if (!part->ends || next > known)
+        return true;
+    Engine *engine = schedule_at(schedule, i);
+    engine_end_ahead(engine);
+    part->t = engine_time(engine);
+    return schedule_over(schedule, i);
 }
 
 bool schedule_signals(Schedule *schedule, uint32_t i, double *values)

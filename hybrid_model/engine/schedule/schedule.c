@@ -119,9 +119,13 @@ static bool first_is_sure(Schedule *schedule, double limit)
 {
     const Queue *queue = &schedule->queue;
     while (schedule->end == SCHEDULE_GOING && queue->count > 0 && queue->times[queue->parts[0]] <= limit) {
-        if (!schedule->parts[queue->parts[0]].unsure)
+        const Part *first = &schedule->parts[queue->parts[0]];
+        if (!first->unsure && !first->ends)
             return true;
-        look_further(schedule, queue->parts[0]);
+        if (first->ends)
+            schedule_end_ahead(schedule, queue->parts[0]);
+        else
+            look_further(schedule, queue->parts[0]);
         if (schedule->work >= schedule->enough)
             return false;
     }

@@ -16,8 +16,6 @@
 #define NO_JUMP UINT32_MAX
 /* Event iterations of one part at one instant, and steps of it in a row that lead nowhere, at most. */
 #define MOST_ITERATIONS 10000
-/* By how many doublings a step grows that is to show why a run ends, at most. */
-#define MOST_HALTS 24
 
 /* Parts with the same maps. */
 typedef struct {
@@ -43,10 +41,10 @@ typedef struct {
     uint32_t iterations, stalls;
     bool touched, pending;
     bool due;                     /* its own event has come; it has not had its turn yet */
-    bool unsure;                  /* its place in the queue is where its look ahead ended, no event */
+    bool unsure;                  /* its place in the queue is where its look ahead ended, no event; */
+    bool ends;                    /* it is where its run ends */
     bool far;                     /* it has looked ahead as far as it may, */
     double reach;                 /* over so many times the steps of one look ahead */
-    uint32_t halts;               /* looks ahead in a row that have found that its run ends */
 } Part;
 
 /* Predicted events, the earliest first and those of one time in the order of parts: a binary heap that knows where in
@@ -160,6 +158,9 @@ bool schedule_step(Schedule *schedule, uint32_t i, double target, bool *event);
 /* Looks ahead from where a part is, some steps far; or as many on from where it has looked, `most` times in all. */
 void schedule_predict(Schedule *schedule, uint32_t i);
 void schedule_predict_further(Schedule *schedule, uint32_t i, double most);
+/* The run is over where a part's look ahead has found that; if it still does, else the part has looked ahead anew.
+   Whether the run goes on. */
+bool schedule_end_ahead(Schedule *schedule, uint32_t i);
 /* The signals of a part as they are; false, and the run is over, if they cannot be computed. */
 bool schedule_signals(Schedule *schedule, uint32_t i, double *values);
 
