@@ -11,6 +11,8 @@
 #endif
 
 #define N_STAGES 16           /* most stages whose rates a method keeps */
+#define N_LINES 3             /* along which rates are looked at for their rounding, */
+#define ON_LINE 17            /* at so many points of each: one rounding is often the same at a few */
 #define N_SAMPLES 9           /* of each margin, where a step is looked at for crossings */
 #define N_GAPS 8              /* gaps of each jump that must look geometric */
 #define N_ZENO_TIMES (N_GAPS + 1)
@@ -143,7 +145,7 @@ typedef struct {
 typedef struct {
     double *rates, *turned;
     bool decides;
-    double *moved, *seen[5], *differences[3];
+    double *moved, *seen[ON_LINE], *differences[N_LINES];
 } Rounding;
 
 typedef struct {

@@ -22,7 +22,8 @@ from hybrid_model.scales import LEFT_BY_ROUNDING, SEEN_PART, STEADY, part_moves,
 
 LOOK_AFTER = 30
 """Evaluations in one step of a stepper, after which some trials of it were rejected."""
-LINES, ON_LINE = 3, 5
+LINES, ON_LINE = 3, 17
+"""One rounding is often the same at a few points of a line."""
 OF_SECOND_DIFFERENCES = 6.0
 """The variance of a second difference of numbers that differ at random is so many times theirs."""
 

@@ -39,6 +39,18 @@ class Stiff(Between):
         return {"x": weight * (s.left - s.x) + weight * (s.right - s.x)}
 
 
+class Waves(hm.HybridAutomaton):
+    """The terms of its rate depend on time alone: nothing that could be moved shows by slopes how large they are."""
+
+    size, turn = 1000.0, 1.0
+    x = hm.State(1e-17, output=True)
+
+    def flow_map(self, s):
+        double = self.size * (np.sin(2.0 * self.turn * s.t) + np.cos(s.t))
+        product = 2.0 * np.sin(self.turn * s.t) * np.cos(self.turn * s.t)
+        return {"x": double - self.size * product - self.size * np.cos(s.t) - 1e-3 * s.x}
+
+
 class Crossing(hm.HybridAutomaton):
     """x = cos(3 t) / 1000 passes zero; its rate is a sum of terms a thousand times as large, which cancel."""
 
@@ -62,6 +74,16 @@ def test_a_state_at_rounding_level_between_neighbours_on_both_sides_runs_on(kind
     assert arc.stop is hm.Stop.HORIZON
     # Rates are wrong by a few 1e-16, and steps by the 64 roundings of rates that they are allowed.
     assert abs(arc.at("x", 10.0)) < 2e-14
+
+
+@pytest.mark.parametrize(("size", "turn"), [(0.5, 7.6), (36.0, 7.62), (56.0, 0.51), (585.0, 4.44)])
+def test_terms_of_time_alone_that_cancel_let_a_state_at_rounding_level_run_on(size, turn):
+    """They crept, since a few points often have one rounding."""
+    kind = type("Waves", (Waves,), {"size": size, "turn": turn})
+    arc = hm.simulate(kind(), 10.0, engine="native")
+    assert arc.stop is hm.Stop.HORIZON
+    # Each rate is wrong by some roundings of its terms, which no more than add up.
+    assert abs(arc.at("x", 10.0)) < 10.0 * 4.0 * size * np.finfo(float).eps
 
 
 @pytest.mark.parametrize("level", [0.0, 1e-17, 1e-16])

@@ -12,8 +12,6 @@
 
 #include "parts.h"
 
-#define N_LINES 3
-#define N_ON_LINE 5
 /* The variance of a second difference of numbers that differ at random is so many times theirs. */
 #define OF_SECOND_DIFFERENCES 6.0
 
@@ -70,20 +68,21 @@ static bool rates_of(Engine *engine, const double *const arguments[MODEL_N_ARG],
 static double by_slope(const Engine *engine, size_t i)
 {
     double *const *seen = engine->rounding.seen;
-    double half = seen[2][i] - seen[0][i], other = seen[4][i] - seen[2][i], whole = fabs(half + other);
+    double middle = seen[ON_LINE / 2][i], half = middle - seen[0][i], other = seen[ON_LINE - 1][i] - middle;
+    double whole = fabs(half + other);
     bool steady = fabs(other - half) <= engine->model->scales.steady * whole;
-    return steady ? whole * DBL_EPSILON / ((N_ON_LINE - 1) * engine->model->scales.seen_part) : 0.0;
+    return steady ? whole * DBL_EPSILON / ((ON_LINE - 1) * engine->model->scales.seen_part) : 0.0;
 }
 
 /* What second differences along a line show of it. */
 static double by_differences(const Engine *engine, size_t i)
 {
     double *const *seen = engine->rounding.seen, sum = 0.0;
-    for (size_t k = 2; k < N_ON_LINE; k++) {
+    for (size_t k = 2; k < ON_LINE; k++) {
         double second = seen[k][i] - seen[k - 1][i] - (seen[k - 1][i] - seen[k - 2][i]);
         sum += second * second;
     }
-    return sqrt(sum / ((N_ON_LINE - 2) * OF_SECOND_DIFFERENCES));
+    return sqrt(sum / ((ON_LINE - 2) * OF_SECOND_DIFFERENCES));
 }
 
 /* Looks along a line, which begins where the one before has ended. */
@@ -91,8 +90,8 @@ static bool look(Engine *engine, const Given *given, size_t line, double later)
 {
     Rounding *of = &engine->rounding;
     const double *arguments[MODEL_N_ARG];
-    for (size_t k = 0; k < N_ON_LINE; k++) {
-        double along = (double)(line * N_ON_LINE + k);
+    for (size_t k = 0; k < ON_LINE; k++) {
+        double along = (double)(line * ON_LINE + k);
         move(engine, given, line, along * later, along * engine->model->scales.seen_part, arguments);
         if (!rates_of(engine, arguments, of->seen[k]))
             return false;
