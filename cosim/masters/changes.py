@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import cast
 
 import numpy as np
@@ -85,13 +85,17 @@ class Changes:
         self.follow(t)
         return set(changed)
 
-    def follow(self, t: float, *, before: bool = False) -> None:
-        """Set the curves to their values at `t` in s, behind a jump that is there but for rounding, or before it."""
+    def follow(self, t: float, *, before: bool = False, held: Collection[str] = ()) -> None:
+        """Set the curves to their values at `t` in s, behind a jump that is there but for rounding, or before it.
+
+        Those of slaves that are `held` stay.
+        """
+        curves = [name for name in self._curves if self._places[name][0] not in held]
         if before:
             jump = self._later[-1][0] if self._later else t
-            self.set(self._curves, math.nextafter(min(t, jump), -math.inf))
+            self.set(curves, math.nextafter(min(t, jump), -math.inf))
         else:
-            self.set(self._curves, max(t, self._reached) if self._reached <= t + ROUNDING * abs(t) else t)
+            self.set(curves, max(t, self._reached) if self._reached <= t + ROUNDING * abs(t) else t)
 
     @property
     def followed(self) -> list[str]:

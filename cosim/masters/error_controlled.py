@@ -306,13 +306,14 @@ class _Run:
             self.ended = outcome.ended
         elif not outcome.due and outcome.early is None:
             self._at_one_time = 0
+            self.macro.insisting.clear()
             self.macro.history.add(t, values, self.macro.slopes())
         else:
-            self._happen(t, outcome.due or {outcome.stopped: STOPPED})
+            self._happen(t, outcome.due or {outcome.stopped: STOPPED}, outcome.held)
             self._h, self._quiet = max(0.1 * self._h, 10.0 * self._resolution), _QUIET
 
-    def _happen(self, t: float, due: dict[str, str]) -> None:
-        """Handle the events at `t` in s, by slave with how they became known."""
+    def _happen(self, t: float, due: dict[str, str], held: Collection[str] = ()) -> None:
+        """Handle the events at `t` in s, by slave with how they became known; of those that are `held` first."""
         result, system = self._result, self._system
         self._at_one_time += 1
         if self._at_one_time > AT_ONE_TIME:
@@ -326,10 +327,11 @@ class _Run:
         if self._who in due:  # it may have taken the event that it named a little before
             self._until = math.inf
         before = len(result.ticks)
-        handled = iterate_events(system, result, t, lambda: self._changes.arrive(t), self.macro.settle)
+        handled = iterate_events(system, result, t, lambda: self._changes.arrive(t), self.macro.settle, held=held)
         self._go_on(t, handled)
         # A slave may stop where its event is about to come, and names times at which there may be none.
         kinds = {name: kind for name, kind in due.items() if name not in handled.idle and not self._is_to_come(name, t)}
+        self.macro.insisting = {name for name in due if name not in kinds and system.slaves[name].has_event_mode}
         kinds = {tick.slave: RECEIVED for tick in result.ticks[before:]} | kinds
         result.events += [Event(t, name, kinds[name]) for name in system.slaves if name in kinds]
         self._row(t)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from dataclasses import dataclass, field
 
 from cosim.errors import CosimError
@@ -39,6 +39,7 @@ def iterate_events(
     settle: Callable[[str], Termination | None],
     *,
     entered: bool = False,
+    held: Collection[str] = (),
 ) -> Handled:
     """Let all slaves with event mode handle their events, signals travelling at once (rule 6).
 
@@ -56,6 +57,8 @@ def iterate_events(
         Lets a slave that handles its events inside handle those that what it has received brings about at once.
     entered : bool
         Whether the slaves are in event mode already.
+    held : collection of str
+        Slaves that handle their events with the inputs that they have, before anything else is set.
 
     Returns
     -------
@@ -69,35 +72,41 @@ def iterate_events(
     events = {name: slave for name, slave in system.slaves.items() if slave.has_event_mode}
     for slave in events.values() if not entered else ():
         slave.enter_event_mode()
-    pending = {*change(), *events}
     sent: dict[tuple[str, str], object] = {}
-    for name in system.slaves:
-        if name not in events:
-            pending |= _send(system, name, sent)
     counts, handled = dict.fromkeys(system.slaves, 0), Handled()
-    while pending:
-        name = next(name for name in system.slaves if name in pending)
-        counts[name] += 1
-        if counts[name] > ITERATIONS:
-            raise CosimError(f"{name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s.")
-        if name in events:
-            update = events[name].update()
-            result.ticks += [Tick(t, name, clock) for clock in update.ticks]
-            again, ended = update.again, update.terminated
-            if update.idle and counts[name] == 1:
-                handled.idle.add(name)
-            if update.next_event is not None:
-                handled.announced[name] = update.next_event
+
+    def those_held() -> set[str]:
+        return set(held)
+
+    def all_others() -> set[str]:
+        found = {*change(), *events}
+        return found.union(*(_send(system, name, sent) for name in system.slaves if name not in events))
+
+    for begin in (those_held, all_others):
+        pending = begin()
+        while pending:
+            name = next(name for name in system.slaves if name in pending)
+            counts[name] += 1
+            if counts[name] > ITERATIONS:
+                raise CosimError(f"{name} asks for more than {ITERATIONS} event iterations at t = {t:.9g} s.")
+            if name in events:
+                update = events[name].update()
+                result.ticks += [Tick(t, name, clock) for clock in update.ticks]
+                again, ended = update.again, update.terminated
+                if update.idle and counts[name] == 1:
+                    handled.idle.add(name)
+                if update.next_event is not None:
+                    handled.announced[name] = update.next_event
+                else:
+                    handled.announced.pop(name, None)
             else:
-                handled.announced.pop(name, None)
-        else:
-            again, ended = False, settle(name)
-        if ended:
-            handled.ended = name, t, ended
-            return handled
-        if not again:
-            pending.discard(name)
-        pending |= _send(system, name, sent)
+                again, ended = False, settle(name)
+            if ended:
+                handled.ended = name, t, ended
+                return handled
+            if not again:
+                pending.discard(name)
+            pending |= _send(system, name, sent)
     past = next((name for name, time in handled.announced.items() if time <= t), None)
     if past is not None:
         raise CosimError(

@@ -47,6 +47,8 @@ class Outcome:
         Whether a slave that handles events inside is about to jump with the inputs that it has at the end.
     ended : (str, float, Termination) or None
         The slave that ended the run, when, and why.
+    held : set of str
+        Slaves that insist on their events, and still have the inputs with which they stopped.
     """
 
     early: float | None = None
@@ -55,6 +57,7 @@ class Outcome:
     exact: bool = False
     pending: bool = False
     ended: tuple[str, float, Termination] | None = None
+    held: set[str] = field(default_factory=set)
 
     @property
     def quiet(self) -> bool:
@@ -99,6 +102,8 @@ class MacroSteps:
         Slave -> the time in s of its next event, of those with event mode that name one: no step goes beyond it.
     near : dict
         Slave that has ended a step after an event that is to be enclosed -> the time in s before which it is.
+    insisting : set of str
+        Slaves that have stopped for an event that they did not have any more when their inputs were brought up to date.
     meet_at_events : bool
         Whether all slaves say where their events are, and nothing else that they exchange changes: any step will do.
     steps : int
@@ -124,6 +129,7 @@ class MacroSteps:
         self._located: dict[str, float] = {}
         self.announced: dict[str, float] = {}
         self.near: dict[str, float] = {}
+        self.insisting: set[str] = set()
         names = [name for name in system.output_names if _is_flowing_number(system, name)]
         self.observe: Callable[[], list[float]] = system.reader(names)
         self.owners = [system.output(name)[0].name for name in names]
@@ -144,9 +150,12 @@ class MacroSteps:
         self.history = SignalHistory(t, self.signals(t), self._no_slopes)
         self.remember()
 
-    def signals(self, t: float) -> list[float]:
-        """Carry the continuous signals, and return them and the outputs of slaves that say nothing of their events."""
-        return [*self.exchange(t), *self._alone()]
+    def signals(self, t: float, held: Collection[str] = ()) -> list[float]:
+        """Carry the continuous signals, and return them and the outputs of slaves that say nothing of their events.
+
+        Those that are `held` keep the inputs that they have.
+        """
+        return [*self.exchange(t, held=held), *self._alone()]
 
     def slopes(self) -> list[float]:
         """Return the derivatives of the signals by time, as far as slaves give them; else NaN."""
@@ -157,28 +166,30 @@ class MacroSteps:
                     found[k] = slope * (self._flows[k].factor if k < len(self._flows) else 1.0)
         return found
 
-    def exchange(self, t: float, *, before: bool = False) -> list[float]:
+    def exchange(self, t: float, *, before: bool = False, held: Collection[str] = ()) -> list[float]:
         """Carry the continuous signals to their inputs at `t` in s, and return them; curves `before` they jump there.
+
+        Those that are `held` keep the inputs that they have.
 
         Raises
         ------
         CosimError
             If they do not settle: outputs depend on inputs at once, in a loop.
         """
-        self._changes.follow(t, before=before)
+        self._changes.follow(t, before=before, held=held)
         settling, sent = Settling(self._system, self._flows, t), self._carried()
-        self._send(sent, [None] * len(sent))
+        self._send(sent, [None] * len(sent), held)
         while not settling.is_done(sent, values := self._carried()):
-            self._send(values, sent)
+            self._send(values, sent, held)
             sent = values
         return values
 
     def _carried(self) -> list[float]:
         return [c.carried(v) for c, v in zip(self._flows, self._read(), strict=True)]
 
-    def _send(self, values: Sequence[float], before: Sequence[float | None]) -> None:
+    def _send(self, values: Sequence[float], before: Sequence[float | None], held: Collection[str]) -> None:
         for connection, value, old in zip(self._flows, values, before, strict=True):
-            if value != old:
+            if value != old and connection.target not in held:
                 self._system.slaves[connection.target].set(connection.input, value)
 
     def remember(self) -> None:
@@ -255,13 +266,15 @@ class MacroSteps:
                 return outcome, []
             # Where a slave is may differ from where all are by rounding.
             self._at[name] = made.reached
+            if made.event and name in self.insisting:
+                outcome.held.add(name)
             if made.reached < t_next - self._resolution:
                 outcome.early, outcome.exact, outcome.stopped = made.reached, name not in self._fed, name
                 return outcome, []
             if made.event:
                 outcome.due[name] = STOPPED
                 outcome.exact = outcome.exact or name not in self._fed
-        values = self.signals(t_next)
+        values = self.signals(t_next, outcome.held)
         outcome.due |= {slave.name: STOPPED for slave in self._probed if self._probe(slave, t_next)}
         outcome.pending = any(self._leaps(slave, read, t_next) for slave, read in self._leaping)
         for name, watched in self._watched.items():

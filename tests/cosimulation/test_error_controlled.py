@@ -68,6 +68,29 @@ def two_balls():
     return hm.simulate(hm.Composition("two", parts, ON_A_BALL), 1.6)
 
 
+@pytest.mark.parametrize(
+    ("height", "e", "above", "end"), [(0.9, 0.8, 2.0, 2.2), (0.70345524, 0.604925336, 2.175474074, 0.8)]
+)
+def test_a_ball_falls_on_one_that_falls_too(height, e, above, end):
+    """What goes away from the ball moves the event that it has stopped for, be it by a step of no length."""
+    parts = {"first": BouncingBall(h=height, e=e), "second": BallOnMovingTable(h=above)}
+    composed = hm.simulate(hm.Composition("two", parts, ON_A_BALL), end)
+    slaves = [AutomatonSlave(name, part, engine="python") for name, part in parts.items()]
+    result = run_error_controlled(System(slaves, ON_A_BALL), end)
+    for name in parts:
+        np.testing.assert_allclose(result.event_times(name), composed.event_times(f"{name}.jump"), atol=TIME, rtol=0)
+
+
+def test_a_ball_falls_on_a_table_of_a_file_that_sinks():
+    """The table is at 1 - 2 t: relative to it the ball begins at 1 m with 2 m/s, and bounces as on one that rests."""
+    given = {"ball.table": Curve(lambda t: 1.0 - 2.0 * t), "ball.table_velocity": -2.0}
+    result = run_error_controlled(System([AutomatonSlave("ball", BallOnMovingTable(h=2.0))], {}), 2.2, inputs=given)
+    first = (2.0 + np.sqrt(4.0 + 2.0 * 9.81)) / 9.81
+    bounce = 2.0 * 0.7 * (9.81 * first - 2.0) / 9.81
+    times = [first, first + bounce, first + 1.7 * bounce]
+    np.testing.assert_allclose(result.event_times("ball"), times, atol=TIME, rtol=0)
+
+
 @pytest.mark.parametrize(("first", "second"), [*itertools.product(("2.0", "3.0"), repeat=2)])
 def test_a_ball_falls_on_a_ball_in_all_versions(first, second, fmus, two_balls):
     """FMI 2.0 has no events: theirs are seen by what they change."""
