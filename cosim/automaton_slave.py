@@ -52,6 +52,7 @@ class AutomatonSlave(Slave):
 
     has_event_mode = True
     can_restore = True
+    tells_jumps = True
 
     @explained(CosimError)
     def __init__(self, name: str, automaton: Automaton, solver: Solver | None = None, *, engine: str = "auto") -> None:

@@ -45,7 +45,8 @@ class CosimResult:
     steps : int
         Steps made by all slaves together.
     events : list of Event
-        Instants at which slaves had events of their own, in order; of masters that handle events.
+        Instants at which slaves had events, in order, with how these became known; of masters that handle events. Those
+        that come of what a slave received (``received``) are there as far as the slave shows them.
     treatment : dict
         Slave -> how its events are treated, in words.
     engine : str
@@ -89,7 +90,7 @@ class CosimResult:
             self.message = f"{slave} ended the run at t = {t:.9g} s{f': {why.message}' if why.message else ''}"
 
     def event_times(self, slave: str) -> npt.NDArray[np.float64]:
-        """Return the times in s at which a slave had events of its own."""
+        """Return the times in s at which a slave had events."""
         return np.array([event.t for event in self.events if event.block == slave])
 
     def tick_times(self, slave: str, clock: str) -> npt.NDArray[np.float64]:

@@ -13,7 +13,6 @@ import numpy as np
 
 from cosim.cli.exits import Exit
 from cosim.cli.progress import Work
-from cosim.masters.error_controlled import RECEIVED
 from cosim.result import CosimResult, Ended
 from cosim.system import System
 from cosim.tables.comparison import deviations
@@ -21,6 +20,7 @@ from cosim.tables.picture import draw
 from cosim.tables.row_file import Columns, RowFile
 from fmu.archives.writing import replacing
 from hybrid_model.record.column_files import write_columns
+from hybrid_model.schedule.scheduler import RECEIVED
 
 
 class RunFiles:

@@ -98,6 +98,11 @@ class Changes:
             self.set(curves, max(t, self._reached) if self._reached <= t + ROUNDING * abs(t) else t)
 
     @property
+    def receivers(self) -> set[str]:
+        """Slaves that values come to."""
+        return {slave for slave, _ in self._places.values()}
+
+    @property
     def followed(self) -> list[str]:
         """Slaves with inputs that follow curves."""
         return [self._places[name][0] for name in self._curves]

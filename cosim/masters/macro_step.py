@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from cosim.errors import CosimError
 from cosim.masters.changes import Changes
+from cosim.masters.event_iteration import Settled
 from cosim.masters.loops import Settling
 from cosim.masters.signal_history import SignalHistory
 from cosim.slave import Port, Slave
@@ -25,6 +26,8 @@ FLOWS = 0.75
 """Part of its change in a step of no length that a number shows in half of the step, if it flows; less than 1."""
 BEYOND = 1e-10
 """Part of the time by which a step is to be longer than to an event, for an FMU to tell of it."""
+NEVER = (math.inf, "")
+"""Of no event."""
 States = list[tuple[Slave, float, Any]]
 """Slaves, where they are in s, and what they gave to return to it."""
 
@@ -41,10 +44,10 @@ class Outcome:
         Which slave that is.
     due : dict
         Slaves with events at the end of the step -> how they became known.
-    exact : bool
-        Whether a slave stopped that has no continuous inputs, so that its event is where it stopped.
-    pending : bool
-        Whether a slave that handles events inside is about to jump with the inputs that it has at the end.
+    sure : set of str
+        Slaves that stopped, or have events at the end, and whose events are there: with other inputs too.
+    pending : list of str
+        Slaves that handle events inside and are about to jump with the inputs that they have at the end.
     ended : (str, float, Termination) or None
         The slave that ended the run, when, and why.
     held : set of str
@@ -54,8 +57,8 @@ class Outcome:
     early: float | None = None
     stopped: str = ""
     due: dict[str, str] = field(default_factory=dict)
-    exact: bool = False
-    pending: bool = False
+    sure: set[str] = field(default_factory=set)
+    pending: list[str] = field(default_factory=list)
     ended: tuple[str, float, Termination] | None = None
     held: set[str] = field(default_factory=set)
 
@@ -67,7 +70,8 @@ class Outcome:
     @property
     def believed(self) -> bool:
         """Whether all are at an event that is where it is."""
-        return self.exact and bool(self.due) and not self.pending and self.early is None and self.ended is None
+        there = bool(self.due) and self.sure.issuperset(self.due)
+        return there and not self.pending and self.early is None and self.ended is None
 
 
 class MacroSteps:
@@ -87,6 +91,8 @@ class MacroSteps:
         Time in s.
     resolution : float
         Length of a probe in s.
+    latest : mapping
+        Slave -> the stop time in s that it has been told, where that is later than `t_stop`.
 
     Attributes
     ----------
@@ -100,17 +106,31 @@ class MacroSteps:
         Nominal values of what `observe` returns, and of what is in `history`; 0 where there is none.
     announced : dict
         Slave -> the time in s of its next event, of those with event mode that name one: no step goes beyond it.
+    named : (float, str)
+        Time in s at which a slave without continuous inputs has ended a step early, and which one: it has its event
+        there, and a step that ends there does not tell.
     near : dict
         Slave that has ended a step after an event that is to be enclosed -> the time in s before which it is.
     insisting : set of str
         Slaves that have stopped for an event that they did not have any more when their inputs were brought up to date.
+    shown, held : dict
+        Slave -> what returns its outputs, and those of them that change at events alone.
     meet_at_events : bool
         Whether all slaves say where their events are, and nothing else that they exchange changes: any step will do.
     steps : int
     """
 
-    def __init__(self, system: System, changes: Changes, t: float, t_stop: float, resolution: float) -> None:
+    def __init__(
+        self,
+        system: System,
+        changes: Changes,
+        t: float,
+        t_stop: float,
+        resolution: float,
+        latest: Mapping[str, float],
+    ) -> None:
         self._system, self._changes, self._t_stop, self._resolution = system, changes, t_stop, resolution
+        self._latest = dict.fromkeys(system.slaves, t_stop) | dict(latest)
         self._flows = [c for c in system.connections if system.is_continuous(c)]
         self._held = [c for c in system.connections if not system.is_continuous(c)]
         self._read = system.reader([f"{c.source}.{c.output}" for c in self._flows])
@@ -120,14 +140,19 @@ class MacroSteps:
         self._fed = {name for name, wires in self._into.items() if wires} | set(changes.followed)
         self._probed = [s for s in system.slaves.values() if s.has_event_mode and s.name in self._fed]
         inside = [slave for slave in system.slaves.values() if not slave.has_event_mode]
-        self._shown = {slave.name: slave.reader(list(slave.outputs)) for slave in inside}
-        self._leaping = [(s, self._shown[s.name]) for s in inside if s.name in self._fed]
+        self.shown = {name: slave.reader(list(slave.outputs)) for name, slave in system.slaves.items()}
+        self.held = {
+            name: slave.reader([output for output in slave.outputs if not _flows(slave.outputs[output])])
+            for name, slave in system.slaves.items()
+        }
+        self._leaping = [s for s in inside if s.name in self._fed]
         # A jump within a step is seen by outputs that nobody hears of too.
         self._heard = {(c.source, c.output) for c in self._held}
         told = {s.name: [o for o in s.outputs if not _flows(s.outputs[o])] for s in inside}
         self._watched = {name: _Watched(system.slaves[name], outputs) for name, outputs in told.items() if outputs}
         self._located: dict[str, float] = {}
         self.announced: dict[str, float] = {}
+        self.named = NEVER
         self.near: dict[str, float] = {}
         self.insisting: set[str] = set()
         names = [name for name in system.output_names if _is_flowing_number(system, name)]
@@ -268,24 +293,45 @@ class MacroSteps:
             self._at[name] = made.reached
             if made.event and name in self.insisting:
                 outcome.held.add(name)
-            if made.reached < t_next - self._resolution:
-                outcome.early, outcome.exact, outcome.stopped = made.reached, name not in self._fed, name
+            behind = made.reached < t_next - self._resolution
+            if (behind or made.event) and name not in self._fed:
+                outcome.sure.add(name)
+            # In a step of no length to speak of the others go on, for one may stop where its input comes to be no more.
+            if behind and t_next - t > 2.0 * self._resolution:
+                outcome.early, outcome.stopped = made.reached, name
                 return outcome, []
-            if made.event:
+            if behind or made.event:
                 outcome.due[name] = STOPPED
-                outcome.exact = outcome.exact or name not in self._fed
         values = self.signals(t_next, outcome.held)
-        outcome.due |= {slave.name: STOPPED for slave in self._probed if self._probe(slave, t_next)}
-        outcome.pending = any(self._leaps(slave, read, t_next) for slave, read in self._leaping)
         for name, watched in self._watched.items():
             if watched.changed():
                 outcome.due[name] = SEEN
                 # What has no continuous inputs has ended its step at its event, or has been searched for it.
-                outcome.exact |= name not in self._fed
+                if name not in self._fed:
+                    outcome.sure.add(name)
         foreseen = {name: ANNOUNCED for name, time in self.announced.items() if time <= t_next}
         outcome.due |= foreseen
-        outcome.exact |= bool(foreseen)
+        outcome.sure.update(foreseen)
+        time, name = self.named
+        if t_next >= time and self._system.slaves[name].stops_after_events:
+            outcome.due.setdefault(name, STOPPED)
+            outcome.sure.add(name)
+        self._look(outcome, t_next)
         return outcome, values
+
+    def _look(self, outcome: Outcome, t: float) -> None:
+        """Add the events that slaves have with the inputs that they have at `t` in s, at the end of a step.
+
+        They are there if what they are sent has just jumped; else inputs have come to what they are on the way.
+        """
+        inside = {name for name in outcome.sure if not self._system.slaves[name].has_event_mode}
+        struck = {wire.target for wire in self._flows if wire.source in inside}
+        for slave in self._probed:
+            if self._probe(slave, t):
+                outcome.due.setdefault(slave.name, STOPPED)
+                if slave.name in struck:
+                    outcome.sure.add(slave.name)
+        outcome.pending = [s.name for s in self._leaping if s.name not in struck and self._leaps(s, t)]
 
     def _step(self, slave: Slave, t_next: float) -> Step:
         """Step a slave to `t_next` in s; one that is searched for its event ends there, as if it had told of it."""
@@ -313,7 +359,7 @@ class MacroSteps:
         Of that it does not tell. But it would end a longer step there, and does not if it goes on from here.
         """
         beyond = t_next + max(2.0 * self._resolution, BEYOND * abs(t_next))
-        if beyond > self._t_stop:
+        if beyond > self._latest[slave.name]:
             return slave.step(t, t_next)
         longer = self._tried(slave, t, beyond)
         made = slave.step(t, t_next)
@@ -362,25 +408,26 @@ class MacroSteps:
         if lines:
             slave.lead(lines)
 
-    def settle(self, name: str) -> Termination | None:
+    def settle(self, name: str) -> Settled:
         """Let a slave that handles its events inside handle those that are due at once, in a step of no length.
 
-        It stays behind that step where something has happened; else the step is taken back.
+        It stays behind that step where something has leapt; else the step is taken back.
         """
         slave, t = self._system.slaves[name], self._at[name]
-        if t + self._resolution > self._t_stop:
-            return None
-        state, before = slave.save(), self._shown[name]()
-        try:
-            made = slave.step(t, t + self._resolution)
-            if _differ(before, self._shown[name]()) or made.terminated:
-                self._at[name] = made.reached
-            else:
-                slave.restore(state)
-        finally:
-            slave.release(state)
+        if t + self._resolution > self._latest[name]:
+            return Settled()
+        leapt = self._leapt(slave, t + self._resolution)
         self.steps += 1
-        return made.terminated
+        if leapt is None:
+            return Settled()
+        made = slave.step(t, t + self._resolution)
+        self._at[name] = made.reached
+        return Settled(made.terminated, any(not slave.direct.get(output) for output in leapt))
+
+    def receivers(self, names: Collection[str]) -> set[str]:
+        """Return the slaves that handle events inside and to which signals flow from some of those slaves."""
+        inside = {slave.name for slave in self._leaping}
+        return {wire.target for wire in self._flows if wire.source in names} & inside
 
     def is_to_come(self, name: str, t: float) -> bool:
         """Return whether a slave still has its event to come after it was in event mode at `t` in s."""
@@ -403,30 +450,36 @@ class MacroSteps:
             slave.release(state)
         return made.event or made.terminated is not None
 
-    def _leaps(self, slave: Slave, read: Callable[[], list[Any]], t: float) -> bool:
-        """Return whether a slave that handles events inside jumps at once with the inputs that it has now.
+    def _leaps(self, slave: Slave, t: float) -> bool:
+        """Return whether a slave that handles events inside jumps at once with the inputs that it has now."""
+        end = t + self._resolution
+        return end <= self._t_stop and self._leapt(slave, end) is not None
 
-        What flows changes half as much in a step of half the length, however small it has been until then.
+    def _leapt(self, slave: Slave, end: float) -> list[str] | None:
+        """Return the outputs that leap in a step to `end`, of no length to speak of, which is taken back; None if none.
+
+        What flows changes half as much in a step of half the length, however small it has been until then. A slave
+        that ends the run has no outputs any more.
         """
-        start, end = self._at[slave.name], t + self._resolution
-        if end > self._t_stop:
-            return False
+        read, start = self.shown[slave.name], self._at[slave.name]
         state, before = slave.save(), read()
         try:
             made = slave.step(start, end)
             after = read()
             slave.restore(state)
             if made.terminated or not _differ(before, after):
-                return made.terminated is not None
+                return [] if made.terminated else None
             slave.step(start, 0.5 * (start + end))
             half = read()
             slave.restore(state)
         finally:
             slave.release(state)
-        return any(
-            _differ([a], [c]) and not (isinstance(a, float) and abs(b - a) < FLOWS * abs(c - a))
-            for a, b, c in zip(before, half, after, strict=True)
-        )
+        leapt = [
+            output
+            for output, a, b, c in zip(slave.outputs, before, half, after, strict=True)
+            if _differ([a], [c]) and not (isinstance(a, float) and abs(b - a) < FLOWS * abs(c - a))
+        ]
+        return leapt or None
 
 
 class _Watched:

@@ -43,6 +43,11 @@ class SignalHistory:
         self._slopes = [*self._slopes, _array(slopes)][-MOST:]
         self._forms = []
 
+    @property
+    def is_long(self) -> bool:
+        """Whether the polynomials go through as many points as they may."""
+        return len(self._times) >= MOST
+
     def copy(self) -> SignalHistory:
         """Return a history that goes on by itself."""
         return copy.copy(self)  # lists are made anew where they change

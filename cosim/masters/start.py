@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import gc
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 from cosim.errors import CosimError, TimesError
@@ -63,11 +64,19 @@ def require_times(t_start: float, t_stop: float, interval: float | None, what: s
         )
 
 
-def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool | None, changes: Changes) -> None:
+def start_slaves(
+    system: System,
+    t_start: float,
+    t_stop: float,
+    *,
+    events: bool | None,
+    changes: Changes,
+    latest: Mapping[str, float] = MappingProxyType({}),
+) -> None:
     """Bring all slaves through initialization mode: values from outside first, then those along the connections.
 
     Events are handled by the master or not; None: in event mode by the slaves that have it, and others may end their
-    steps early.
+    steps early. Some slaves are told a stop time in s that is later (`latest`).
 
     Raises
     ------
@@ -76,7 +85,7 @@ def start_slaves(system: System, t_start: float, t_stop: float, *, events: bool 
     """
     for slave in system.slaves.values():
         wanted = slave.has_event_mode if events is None else events
-        slave.start(t_start, t_stop, events=wanted, early=events is None and not wanted)
+        slave.start(t_start, latest.get(slave.name, t_stop), events=wanted, early=events is None and not wanted)
     changes.set_start_values()
     known: dict[tuple[str, str], float] = {}
     connections = in_order(system)

@@ -43,6 +43,8 @@ class AutomatonBlock(Block):
         What it has run so far.
     """
 
+    tells_jumps = True
+
     def __init__(
         self,
         name: str,

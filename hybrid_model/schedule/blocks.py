@@ -85,11 +85,14 @@ class Block(ABC):
         Whether the next event that it names is the first of all of its events; FMI asks that of time events alone.
     can_restore : bool
         Whether `save` and `restore` work.
+    tells_jumps : bool
+        Whether the `idle` of its updates says of each of them whether it has jumped; else it says so of the first.
     """
 
     name: str
     foresees: bool = True
     can_restore: bool = True
+    tells_jumps: bool = False
 
     @abstractmethod
     def set(self, name: str, value: float) -> None:

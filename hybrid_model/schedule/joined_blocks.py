@@ -19,7 +19,7 @@ from hybrid_model.schedule.blocks import StiffPart, Termination
 from hybrid_model.schedule.native_block import OF_THE_RUN, NativeBlock
 from hybrid_model.schedule.native_network import EVENTS_AT_ONCE, STEPS_AHEAD
 from hybrid_model.schedule.part_table import ROWS, wires_by_source
-from hybrid_model.schedule.scheduler import ANNOUNCED, Event, Tick, Wire
+from hybrid_model.schedule.scheduler import ANNOUNCED, RECEIVED, Event, Tick, Wire
 
 
 class JoinedBlocks:
@@ -59,6 +59,7 @@ class JoinedBlocks:
         self.ended: tuple[str, float, Termination] | None = None
         self._t_start, self._give = span[0], give
         self._names, self._blocks, self._watch = list(blocks), list(blocks.values()), watch
+        self._listed = [-np.inf] * len(blocks)
         self._numbers = {name: part for part, name in enumerate(blocks)}
         self._network = _network(self._blocks, self._names, wires_from)
         self._network.log_instants()
@@ -158,8 +159,9 @@ class JoinedBlocks:
         for t, part, jump, own in zip(events.t, events.part, events.jump, events.values[:, 0], strict=True):
             name = self._names[part]
             self.ticks += [Tick(float(t), name, clock) for number, clock in self._blocks[part].clocks if number == jump]
-            if own:
-                self.events.append(Event(float(t), name, ANNOUNCED))
+            if own or (t > self._t_start and self._listed[part] < t):
+                self.events.append(Event(float(t), name, ANNOUNCED if own else RECEIVED))
+                self._listed[part] = t
 
     def _note(self, advance: NetworkAdvance) -> None:
         """Note why the run is over, if it is."""

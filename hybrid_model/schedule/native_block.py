@@ -63,6 +63,8 @@ class NativeBlock(Block):
         If there is no compiler, or it fails.
     """
 
+    tells_jumps = True
+
     def __init__(
         self,
         name: str,

@@ -56,6 +56,8 @@ ANNOUNCED = "announced"
 """Of an event: it was at the time that its block had named."""
 STOPPED = "stopped"
 """Of an event: its block ended a step there."""
+RECEIVED = "received"
+"""Of an event: what its block received at that instant brought it about."""
 
 
 class Event(NamedTuple):
@@ -127,7 +129,8 @@ class Scheduler:
     ticks : list of Tick
         Ticks of output clocks, in order.
     events : list of Event
-        Instants at which blocks had events of their own, in order.
+        Instants at which blocks had events, in order: of their own, and after the start those that are known to come of
+        what a block received: it told of them, a clock ticked, it asked for an iteration, or it sent something new.
     steps : int
         Steps made by all blocks together.
     ended : (str, float, Termination) or None
@@ -155,6 +158,7 @@ class Scheduler:
         # Blocks go by their order from here on: numbers sort themselves.
         self._unpredictable: set[int] = set()
         self._idle: set[int] = set()
+        self._moved: dict[int, bool] = {}
         self._left: set[int] = set()
         self._queue: list[tuple[float, int, int]] = []
 
@@ -234,10 +238,11 @@ class Scheduler:
         self._idle.clear()
         known = self._known(t, left)
         self._iterate(t, given.union(left))
-        self.events += [event for order, event in known.items() if order not in self._idle]
+        self._list(t, known)
 
     def _iterate(self, t: float, due: set[int]) -> None:
         pending, touched = set(due), set(due)
+        self._moved.clear()
         iterations: dict[int, int] = {}
         self.t = t
         while pending and not self.ended:
@@ -256,6 +261,11 @@ class Scheduler:
                 self.ticks += [Tick(t, place.block.name, clock) for clock in ticks]
             if idle and iterations[order] == 1:
                 self._idle.add(order)
+            # Predictions end at the stop time, where there may be no event.
+            if again or ticks or (place.block.tells_jumps and not idle):
+                self._moved[order] = True
+            else:
+                self._moved.setdefault(order, False)
             if terminated:
                 self.ended = place.block.name, t, terminated
                 return
@@ -277,10 +287,18 @@ class Scheduler:
             self._in_order[order].block.enter_event_mode()
         self._idle.clear()
         self._iterate(t, due)
-        # Predictions end at the stop time, where there may be no event.
-        self.events += [event for order, event in known.items() if order not in self._idle]
+        self._list(t, known)
         if self._watch:
             self._watch(t)
+
+    def _list(self, t: float, known: Mapping[int, Event]) -> None:
+        """List the events at `t` in s: those that were known before they were handled, and what these brought about."""
+        own = {order: event for order, event in known.items() if order not in self._idle}
+        for order, shown in self._moved.items():
+            if order in own:
+                self.events.append(own[order])
+            elif shown and t > self._t_start:
+                self.events.append(Event(t, self._in_order[order].block.name, RECEIVED))
 
     def _known(self, t: float, due: Iterable[int]) -> dict[int, Event]:
         """Return the events of blocks at `t` in s, by what is known of them before they are handled."""
@@ -308,6 +326,7 @@ class Scheduler:
             if link.holds == value:
                 continue
             link.holds = value
+            self._moved[place.order] = True
             if target.order not in touched:
                 self._require_behind(target, t, place.block.name)
                 self._bring(target, t)

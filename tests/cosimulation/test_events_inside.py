@@ -48,7 +48,7 @@ def starts(slaves):
 def exact():
     system = System(starts(agents(lambda name: AutomatonSlave(name, Sends()))), WIRES)
     result = run_event_exact(system, T_END)
-    assert len(result.events) == 24
+    assert len(result.events) == 28
     return result
 
 
@@ -76,7 +76,7 @@ def test_the_command_meets_fmi2_at_its_events(exported, tmp_path, capsys):
         '[connections]\n"a.heard" = "b.sent"\n"b.heard" = "a.sent"\n'
     )
     assert main(["cosim", str(tmp_path)]) == 0
-    assert "b: 9 events at 1.87324039, 3.78459902" in capsys.readouterr().out
+    assert "b: 13 events at 1.87324039, 3.78459902" in capsys.readouterr().out
 
 
 class Hides(hm.HybridAutomaton):
@@ -180,6 +180,183 @@ class Beats(hm.HybridAutomaton):
     transitions = (
         hm.TimeEvent("beat", lambda self, s: (s.sent + 1.0) * s.period, lambda self, s: {"sent": s.sent + 1.0}),
     )
+
+
+class Relay(hm.HybridAutomaton):
+    """Takes over what it hears, and counts that where nobody sees it."""
+
+    heard = hm.Input(0.0, discrete=True)
+    u = hm.Input(0.0)
+    sent = hm.DiscreteState(0.0, output=True)
+    count = hm.DiscreteState(0.0)
+
+    transitions = (
+        hm.Jump("take", lambda self, s: (s.heard - s.sent) ** 2 - 0.25, lambda self, s: {"sent": s.heard}),
+        hm.Jump("count", lambda self, s: s.u - s.count - 0.5, lambda self, s: {"count": s.u}),
+    )
+
+
+class Stairs(hm.HybridAutomaton):
+    """Beats whose number is declared as if it flowed."""
+
+    u = hm.Input(0.0)
+    period = hm.Parameter(0.5)
+    n = hm.DiscreteState(0.0)
+    y = hm.Output()
+
+    def outputs(self, s):
+        return {"y": s.n}
+
+    transitions = (hm.TimeEvent("beat", lambda self, s: (s.n + 1.0) * s.period, lambda self, s: {"n": s.n + 1.0}),)
+
+
+class Follows(hm.HybridAutomaton):
+    """Takes over what has come to its flowing input, as soon as that is a half away."""
+
+    u = hm.Input(0.0)
+    taken = hm.DiscreteState(0.0)
+    y = hm.Output()
+
+    def outputs(self, s):
+        return {"y": s.taken}
+
+    transitions = (hm.Jump("take", lambda self, s: (s.u - s.taken) ** 2 - 0.25, lambda self, s: {"taken": s.u}),)
+
+
+@pytest.fixture
+def slave(exported):
+    """Slaves of models: automata in this process, or FMUs of a version."""
+
+    def made(name, model, version, **starts):
+        key = type(model).__name__.lower()
+        found = FmuSlave(name, exported(model, key, version)) if version else AutomatonSlave(name, model)
+        for variable, value in starts.items():
+            found.set(variable, value)
+        return found
+
+    return made
+
+
+@pytest.mark.parametrize("source", ["2.0", "3.0", None])
+@pytest.mark.parametrize("order", [1, -1])
+@pytest.mark.parametrize("discrete", [True, False])
+def test_what_an_event_at_the_stop_time_brings_about_happens(source, order, discrete, slave):
+    """One that handles its events inside does so at that time, and another one that hears of it: 0.5 and 1 s."""
+    first, then = (Beats, Relay) if discrete else (Stairs, Follows)
+    slaves = [slave("a", first(), source), slave("b", then(), "2.0"), slave("c", then(), "2.0")]
+    into, out, sent = ("heard", "sent", "sent") if discrete else ("u", "y", "y")
+    wires = {f"b.{into}": f"a.{sent}", f"c.{into}": f"b.{out}"}
+    result = run_error_controlled(System(slaves[::order], wires), 1.0)
+    assert [result.final[f"{name}.{out}"] for name in "abc"] == [2.0, 2.0, 2.0]
+    assert result.t == 1.0
+    for name in "abc":
+        np.testing.assert_allclose(result.event_times(name), [0.5, 1.0], atol=1e-12, rtol=0)
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0", None])
+def test_an_event_behind_the_stop_time_by_rounding_is_not_taken(version, slave):
+    """3 * 0.1 is above 0.3: the run ends where it is told to (rule 6)."""
+    slaves = [slave("a", Beats(), version, period=0.1), slave("b", Relay(), "2.0")]
+    result = run_error_controlled(System(slaves, {"b.heard": "a.sent"}), 0.3)
+    assert (result.final["a.sent"], result.final["b.sent"]) == (2.0, 2.0)
+
+
+@pytest.mark.parametrize("source", ["2.0", "3.0"])
+@pytest.mark.parametrize("version", ["2.0", "3.0", None])
+def test_events_that_a_signal_brings_about_are_listed_where_they_show(source, version, slave):
+    slaves = [slave("a", Beats(), source), slave("b", Relay(), version), slave("hidden", Relay(), version)]
+    wires = {"b.heard": "a.sent", "hidden.u": "a.sent"}
+    result = run_error_controlled(System(slaves, wires), 1.2)
+    kinds = {(event.t, event.block): event.kind for event in result.events}
+    expected = dict.fromkeys([(0.5, "a"), (1.0, "a")], "seen" if source == "2.0" else "announced")
+    expected |= dict.fromkeys([(0.5, "b"), (1.0, "b")], "received")
+    if version is None:  # automata tell
+        expected |= dict.fromkeys([(0.5, "hidden"), (1.0, "hidden")], "received")
+    assert kinds == expected
+
+
+@pytest.mark.parametrize("engine", ["native", "python"])
+def test_the_event_exact_master_lists_what_a_signal_brings_about(engine):
+    slaves = [AutomatonSlave("a", Beats(), engine=engine), AutomatonSlave("b", Relay(), engine=engine)]
+    result = run_event_exact(System(slaves, {"b.heard": "a.sent"}), 1.2)
+    assert [(event.t, event.block, event.kind) for event in result.events] == [
+        (0.5, "a", "announced"),
+        (0.5, "b", "received"),
+        (1.0, "a", "announced"),
+        (1.0, "b", "received"),
+    ]
+
+
+@pytest.mark.parametrize(("first", "second"), [("2.0", "2.0"), ("2.0", "3.0"), ("3.0", "2.0"), ("3.0", "3.0")])
+@pytest.mark.parametrize("flowing", [True, False])
+def test_times_that_differ_by_rounding_are_one_event_with_two_rows(first, second, flowing, slave):
+    """3 * 0.7 is below 2.1 by rounding, as are 6 * 0.7 and 9 * 0.7; each of both is there once, with two rows."""
+    model, into, out = (Stairs, "u", "y") if flowing else (Beats, "heard", "sent")
+    slaves = [slave("a", model(), first, period=0.7), slave("b", model(), second, period=2.1)]
+    wires = {f"b.{into}": f"a.{out}", f"a.{into}": f"b.{out}"}
+    result = run_error_controlled(System(slaves, wires), 6.5, output_interval=1.0)
+    np.testing.assert_allclose(result.event_times("a"), 0.7 * np.arange(1, 10), atol=1e-11, rtol=0)
+    np.testing.assert_allclose(result.event_times("b"), 2.1 * np.arange(1, 4), atol=1e-11, rtol=0)
+    for t in 2.1 * np.arange(1, 4):
+        rows = [k for k, time in enumerate(result.times) if abs(time - t) < 1e-9]
+        n, m = round(t / 0.7), round(t / 2.1)
+        assert [(result.signals[f"a.{out}"][k], result.signals[f"b.{out}"][k]) for k in rows] == [
+            (n - 1, m - 1),
+            (n, m),
+        ]
+
+
+@pytest.mark.parametrize(("first", "second"), [("2.0", "2.0"), ("2.0", "3.0"), ("3.0", "2.0")])
+def test_stairs_are_enclosed_by_where_their_fmus_have_stopped(first, second, slave):
+    """Halving takes some 43 steps of both, each in more than one way; where an FMU has stopped its event is."""
+    slaves = [slave("a", Stairs(), first, period=0.5), slave("b", Stairs(), second, period=0.3)]
+    result = run_error_controlled(System(slaves, {"b.u": "a.y", "a.u": "b.y"}), 4.0)
+    np.testing.assert_allclose(result.event_times("a"), 0.5 * np.arange(1, 9), atol=1e-11, rtol=0)
+    np.testing.assert_allclose(result.event_times("b"), 0.3 * np.arange(1, 14), atol=1e-11, rtol=0)
+    assert result.steps < 60 * len(result.events)
+
+
+class Rise(hm.HybridAutomaton):
+    """Rises with time, and begins anew at each cue."""
+
+    cue = hm.Input(0.0, discrete=True)
+    seen = hm.DiscreteState(0.0)
+    x = hm.State(0.0, output=True)
+
+    def flow_map(self, s):
+        return {"x": 1.0}
+
+    transitions = (
+        hm.Jump("reset", lambda self, s: (s.cue - s.seen) ** 2 - 0.25, lambda self, s: {"x": 0.0, "seen": s.cue}),
+    )
+
+
+class Warden(hm.HybridAutomaton):
+    """Gives a cue when its input has come to one, and is ready again when it is below a half."""
+
+    u = hm.Input(0.0)
+    ready = hm.DiscreteState(1.0)
+    cue = hm.DiscreteState(0.0, output=True)
+
+    transitions = (
+        hm.Jump(
+            "give",
+            lambda self, s: hm.least(s.u - 1.0, s.ready - 0.5),
+            lambda self, s: {"cue": s.cue + 1.0, "ready": 0.0},
+        ),
+        hm.Jump("rest", lambda self, s: hm.least(0.5 - s.u, 0.5 - s.ready), lambda self, s: {"ready": 1.0}),
+    )
+
+
+@pytest.mark.parametrize("source", ["2.0", "3.0", None])
+@pytest.mark.parametrize("warden", ["2.0", "3.0", None])
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_signal_that_its_receiver_resets_at_the_same_instant(source, warden, order, slave):
+    """One cue each second, also where the one that rises foretells that nothing happens until the end."""
+    slaves = [slave("a", Rise(), source), slave("b", Warden(), warden)]
+    result = run_error_controlled(System(slaves[::order], {"a.cue": "b.cue", "b.u": "a.x"}), 3.5)
+    np.testing.assert_allclose(result.event_times("b"), [1.0, 2.0, 3.0], atol=1e-11, rtol=0)
+    assert result.final["a.x"] == pytest.approx(0.5, abs=1e-11)
 
 
 @pytest.mark.parametrize("version", ["2.0", None])
