@@ -168,7 +168,7 @@ class FmuSlave(Slave):
             raise CosimError(f"{self.name} has no event mode: use the fixed-step master.")
         instance = self.load()
         self._file.claim()
-        self._events, self._early = events, early
+        self._events, self._early, self.failed_at_end, self.calls.failed = events, early, "", False
         try:
             self.calls(instance.instantiate, events, early)
         except Exception as error:
@@ -280,8 +280,13 @@ class FmuSlave(Slave):
         self.calls(self._instance.release, state[0])
 
     def close(self) -> None:
-        """See `Slave.close`."""
+        """See `Slave.close`; an FMU whose run began is terminated first, unless a call of it failed."""
         if self._access is not None:
+            if self._begun and not self.calls.failed:
+                try:
+                    self.calls(self._instance.call, "Terminate")
+                except CosimError as error:
+                    self.failed_at_end = str(error)
             if not self.calls.fatal:
                 self._access.instance.free()
             self._access, self._do_step, self._begun, self._give_slopes = None, self._first_step, False, None

@@ -71,6 +71,8 @@ class Slave(Block):
 
     has_event_mode: bool
     """Whether events can be handled by the master, at their exact times."""
+    failed_at_end: str = ""
+    """What went wrong when it was closed; the run was over then."""
     stops_after_events: bool = False
     """Whether a block that handles its events inside ends its step after each one, if it may (`early` in `start`)."""
     variable_step: bool = True

@@ -22,7 +22,6 @@ from cosim.cli.step_study import study
 from cosim.cli.system_fmus import with_fmus
 from cosim.consensus import fmu_system
 from cosim.errors import CosimError, GivenValueError, MisfitError, TimesError, UsageError
-from cosim.isolation.isolated_slave import IsolatedSlave
 from cosim.masters import run_error_controlled, run_event_exact, run_fixed_step
 from cosim.masters.changes import Curve, Given
 from cosim.masters.error_controlled import TOLERANCE
@@ -275,8 +274,11 @@ def _run(system: System, options: argparse.Namespace, experiment: Experiment) ->
     else:
         print(_text(result), *compared, sep="\n")
     for slave in system.slaves.values():
-        if isinstance(slave, IsolatedSlave) and slave.failed_at_end:
-            print(f"hybrid-fmu: {slave.failed_at_end} The run was over, and its results are whole.", file=sys.stderr)
+        if slave.failed_at_end:
+            print(
+                f"hybrid-fmu: {slave.failed_at_end.rstrip('.')}. The run was over, and its results are whole.",
+                file=sys.stderr,
+            )
     if standing := standing_still(system, result):
         print(f"hybrid-fmu: {standing}", file=sys.stderr)
     return max(exit_of(result.ended.name), status)

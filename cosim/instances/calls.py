@@ -29,6 +29,8 @@ class FmuCalls:
     ----------
     fatal : bool
         Whether a call was fatal; after it no function may be called, the one that frees the instance neither.
+    failed : bool
+        Whether a call failed; after it the instance may be freed, and not be terminated.
     messages : deque of tuple
         Status and text of what the FMU said in the present call, or in the last.
     """
@@ -36,7 +38,7 @@ class FmuCalls:
     def __init__(self, name: str) -> None:
         self._name = name
         self.messages: deque[tuple[int, str]] = deque(maxlen=MESSAGES)
-        self.fatal = False
+        self.fatal = self.failed = False
 
     def hear(self, status: int, text: str) -> None:
         """Take a message of the FMU: its status, and its text."""
@@ -76,6 +78,7 @@ class FmuCalls:
     def _failure(self, error: FMICallException | VersionError) -> CosimError:
         if isinstance(error, VersionError):
             return CosimError(str(error))
+        self.failed = True
         self.fatal = self.fatal or error.status == fmi3Fatal
         return CosimError(f"{self._name}: {error.function} failed: {self.said}")
 

@@ -76,6 +76,11 @@ class Served:
         """Load the binary."""
         self._slave.load()
 
+    def close(self) -> str:
+        """Close the slave; return what failed in that."""
+        self._slave.close()
+        return self._slave.failed_at_end
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self._slave, name)
 

@@ -43,11 +43,6 @@ class IsolatedSlave(Slave):
     patience : float
         Seconds that one call may take.
 
-    Attributes
-    ----------
-    failed_at_end : str
-        What went wrong when its instance was freed, where that did; the run is over then.
-
     Raises
     ------
     CosimError
@@ -69,7 +64,6 @@ class IsolatedSlave(Slave):
         self._make = (kind, name, str(path)), {"validate": validate}
         self._given: list[tuple[str, Value]] = []
         self._readers: dict[int, str] = {}
-        self.failed_at_end = ""
         self._begin()
         super().__init__(name, list(self.inputs.values()), list(self.outputs.values()), self.clocks, self.tunable)
 
@@ -156,7 +150,7 @@ class IsolatedSlave(Slave):
         if self._process is None:
             return
         try:
-            self._call("close")
+            self.failed_at_end = self._call("close")
         except CosimError as error:
             self.failed_at_end = str(error)
         self._end()

@@ -205,7 +205,14 @@ API void BOTH(FreeInstance)(State* s) { free(s); }
 API int BOTH(ExitInitializationMode)(State* s) { s->initializing = 0; return OK; }
 API int BOTH(EnterEventMode)(State* s) { (void)s; return OK; }
 API int BOTH(EnterContinuousTimeMode)(State* s) { (void)s; return OK; }
-API int BOTH(Terminate)(State* s) { (void)s; return OK; }
+API int BOTH(Terminate)(State* s) {
+#ifdef FAULT_LAST_WORDS
+    fprintf(stderr, "terminated at %g\n", s->t);
+    return ERROR;
+#endif
+    (void)s;
+    return OK;
+}
 API int BOTH(Reset)(State* s) { reset(s); return OK; }
 API int NAMED(GetReal, GetFloat64)(State* s, const uint32_t r[], size_t n, double v[]) {
     for (size_t i = 0; i < n; i++) if (get(s, r[i], v + i)) return ERROR;
