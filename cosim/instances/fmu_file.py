@@ -44,7 +44,7 @@ class FmuFile:
     start_time, stop_time, step : float or None
         What the description proposes for a run, in s.
     internal_step : float or None
-        Length in s of the steps that its solver makes, if they have one.
+        Length in s of the steps that its solver makes, if they have one and there is a state to integrate.
 
     Raises
     ------
@@ -80,6 +80,9 @@ class FmuFile:
         self.internal_step = _seconds(getattr(self.interface, "fixedInternalStepSize", None))
         if self.step is None:
             self.step = self.internal_step
+        if self.description.modelExchange is not None and not self.description.derivatives:
+            # The model is all there, and without a continuous state no output waits for a step of a solver.
+            self.internal_step = None
 
     @property
     def ours(self) -> bool:

@@ -29,6 +29,10 @@ def by_fixed_steps(slave: Slave, step: float, *, alone: bool) -> str:
     if alone:
         return "events inside, at the times that it finds"
     late = f"events inside; others hear of them at the next communication point, up to {step:.6g} s late"
+    if slave.can_restore and slave.variable_step and slave.internal_step is not None:
+        return (
+            f"{late} (its outputs move every {slave.internal_step:.6g} s: --master error-controlled looks between them)"
+        )
     if slave.can_restore or not slave.variable_step:
         return late
     return f"{late} (it cannot save its state: --master error-controlled repeats its run to enclose them)"

@@ -1,13 +1,16 @@
 """Which signals depend on each other at once, by the descriptions of FMUs: order of start values, loops in full."""
 
+from zipfile import ZipFile
+
 import pytest
 
 import hybrid_model as hm
+from cosim.automaton_slave import AutomatonSlave
 from cosim.errors import CosimError
 from cosim.feedthrough import in_order
 from cosim.fmu_slave import FmuSlave
 from cosim.isolation.isolated_slave import IsolatedSlave
-from cosim.masters import run_error_controlled
+from cosim.masters import run_error_controlled, run_fixed_step
 from cosim.masters.start import transfer_start
 from cosim.system import System
 
@@ -65,3 +68,36 @@ def test_what_an_output_does_not_depend_on_makes_no_loop(path):
     """x' = y and y' = x from 3 and 3: both are 3 exp(t)."""
     result = run_error_controlled(System(slaves(path, 2), {"d1.u": "d0.apart", "d0.u": "d1.apart"}), 0.5)
     assert result.final["d0.apart"] == pytest.approx(3.0 * 1.6487212707001282, rel=1e-6)
+
+
+class Passes(hm.HybridAutomaton):
+    u = hm.Input(0.0)
+    y = hm.Output()
+
+    def outputs(self, s):
+        return {"y": s.u}
+
+
+@pytest.mark.parametrize(("automaton", "step"), [(Passes, None), (Doubles, 0.1)])
+def test_steps_of_a_solver_count_where_there_is_something_to_integrate(automaton, step, exported, tmp_path):
+    """A description that gives the length of internal steps, as those of the Reference FMUs do, states or none."""
+    path = tmp_path / "stepping.fmu"
+    with ZipFile(exported(automaton(), automaton.__name__.lower())) as plain, ZipFile(path, "w") as written:
+        for name in plain.namelist():
+            content = plain.read(name)
+            if name == "modelDescription.xml":
+                assert content.count(b"<CoSimulation ") == 1
+                content = content.replace(b"<CoSimulation ", b'<CoSimulation fixedInternalStepSize="0.1" ')
+            written.writestr(name, content)
+    first, second = slaves(path, 2)
+    assert (first.internal_step, first.default_step) == (step, 0.1)
+    wave = AutomatonSlave("wave", Wave())
+    result = run_fixed_step(System([wave, first, second], {"d0.u": "wave.y", "d1.u": "d0.y"}), 1.0, 0.5)
+    assert ("--master error-controlled looks between them" in result.treatment["d0"]) == (step is not None)
+
+
+class Wave(hm.HybridAutomaton):
+    y = hm.Output()
+
+    def outputs(self, s):
+        return {"y": s.t}
