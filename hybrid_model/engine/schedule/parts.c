@@ -220,6 +220,8 @@ bool schedule_end_ahead(Schedule *schedule, uint32_t i)
     Engine *engine = schedule_at(schedule, i);
     engine_end_ahead(engine);
     part->t = engine_time(engine);
+    /* The others are shown as they are there. */
+    schedule->t = fmax(schedule->t, part->t);
     return schedule_over(schedule, i);
 }
 
