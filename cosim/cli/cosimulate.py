@@ -29,7 +29,7 @@ from cosim.masters.standing_signals import standing_still
 from cosim.result import CosimResult
 from cosim.slave import Slave
 from cosim.system import System
-from cosim.systems.assembly import assemble, sizes_first
+from cosim.systems.assembly import assemble, set_start, sizes_first
 from cosim.systems.definition import (
     AUTOMATON,
     ERROR_CONTROLLED,
@@ -225,12 +225,19 @@ def _agents(scenario: Scenario, folder: Path, fmi: str) -> System:
 
 
 def _set_starts(slaves: dict[str, Slave], starts: dict[str, str]) -> None:
-    for name in sizes_first(starts):
-        slave, own = _owner(slaves, name)
+    places = {name: _owner(slaves, name) for name in starts}
+    values: dict[str, str | list[str]] = {
+        name: text.split() if _is_array(*places[name]) else text for name, text in starts.items()
+    }
+    for name in sizes_first(values):
         try:
-            slave.set(own, slave.parse(own, starts[name]))
+            set_start(*places[name], values[name])
         except CosimError as error:
             raise UsageError(f"--start-value: {error}") from error
+
+
+def _is_array(slave: Slave, name: str) -> bool:
+    return name not in slave.variable_names and slave.has(name)
 
 
 def _owner(slaves: dict[str, Slave], name: str) -> tuple[Slave, str]:

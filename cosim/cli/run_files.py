@@ -98,8 +98,10 @@ class RunFiles:
             lines.append(f"  not compared, as the run has none of that form: {', '.join(compared.missing)}")
         for found in compared.found:
             beyond = f": beyond {tolerance:g}" if not found.largest <= tolerance else ""
-            line = f"{found.name} differs from {file.name} by {found.largest:.3g} of its size"
-            lines.append(f"  {line}, at {found.t:.9g} s{beyond}")
+            line = (
+                f"{found.name} differs from {file.name} by {found.largest:.3g} of its size, at {found.t:.9g} s{beyond}"
+            )
+            lines.append(f"  {found.name} is as in {file.name}" if found.largest == 0.0 else f"  {line}")
         # A run that was to be shorter is as good as its part of the table; one that broke off is not.
         broke_off = result.ended is not Ended.HORIZON and compared.goes_on
         if told := compared.told():

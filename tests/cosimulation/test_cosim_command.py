@@ -109,6 +109,13 @@ def test_steps_of_one_length_do_not_differ_by_rounding(stranger):
     assert sizes == {0.1}
 
 
+def test_an_array_is_given_whole(stranger, capsys):
+    cosim(stranger(), "--start-value", "weights=1 2 4", "--start-value", "size=3")
+    assert "stranger.total = 7\n" in capsys.readouterr().out
+    cosim(stranger(), "--start-value", "stranger.weights=1", "--start-value", "size=3", status=2)
+    assert "weights has 3 elements, weights[1] to weights[3], but is given a list of 1" in capsys.readouterr().err
+
+
 def test_a_variable_whose_name_begins_as_the_fmu_is_called_is_set(stranger, capsys):
     cosim(stranger(), "--start-value", "stranger.h=2.5", "--start-value", "stranger.rate=0.5")
     assert "stranger: 1 event at 2 s" in capsys.readouterr().out

@@ -212,7 +212,7 @@ def test_a_run_is_compared_with_a_table(echo, tmp_path, capsys):
     out = tmp_path / "out.csv"
     assert main(["cosim", str(echo), "--output-file", str(out)]) == 0
     assert main(["cosim", str(echo), "--reference-file", str(out)]) == 0
-    assert "x differs from out.csv by 0 of its size" in capsys.readouterr().out
+    assert "  x is as in out.csv\n" in capsys.readouterr().out
     off = written(tmp_path / "off.csv", "time,x,unknown\n0,0,0\n0.5,0.51,0\n")
     assert main(["cosim", str(echo), "--reference-file", str(off)]) == 1
     said = capsys.readouterr().out

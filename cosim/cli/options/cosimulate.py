@@ -87,7 +87,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="a number, true or false, the name of an enumeration's item, text, or bytes in base 16; repeatable",
+        help="a number, true or false, the name of an enumeration's item, text, or bytes in base 16; for an array one "
+        "for each element with spaces between, row by row; repeatable",
     )
     parser.add_argument(
         "--input-file", type=Path, metavar="IN.csv", help="time, and inputs that nothing drives and tunable parameters"
