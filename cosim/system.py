@@ -315,6 +315,8 @@ class System:
     def _elements(self, target: str, sources: str | Sequence[str]) -> list[tuple[str, str]]:
         """Return the elements of an input with the outputs they are connected to."""
         places = self._places(target, "input")
+        if not sources and not places and self.owner(target)[1] not in self._ports(target, "input"):
+            return []  # an array without elements, such as the broadcasts that an agent without neighbours hears
         if not isinstance(sources, str):
             self._require_one_each(target, places, sources)
             return [(target + place, source) for place, source in zip(places, sources, strict=True)]

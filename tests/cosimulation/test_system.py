@@ -4,6 +4,7 @@ import re
 import zipfile
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import hybrid_model as hm
@@ -224,3 +225,22 @@ def test_measures_of_fmus_are_those_that_they_declare(tmp_path):
     ports = FmuSlave("ball", path).outputs
     assert ports["h"].measure == METRE
     assert ports["v"].measure == Measure((0, 1, -1, 0, 0, 0, 0, 0))
+
+
+class Ears(hm.HybridAutomaton):
+    degree = hm.Dimension()
+    heard = hm.Input(0.0, shape="degree", discrete=True)
+    level = hm.Output()
+
+    def outputs(self, s):
+        return {"level": np.sum(s.heard)}
+
+
+@pytest.mark.parametrize("kind", ["automaton", "fmu"])
+def test_an_array_without_elements_is_driven_by_nobody(kind, exported):
+    """As the broadcasts that an agent without neighbours hears; of an FMU the description leaves the array out."""
+    deaf = Ears(heard=[])
+    slave = AutomatonSlave("deaf", deaf) if kind == "automaton" else FmuSlave("deaf", exported(deaf, "deaf"))
+    assert System([slave], {"deaf.heard": []}).connections == ()
+    with pytest.raises(MisfitError, match=r"heard has 2 elements, \[1\] to \[2\], but is given a list of 0 outputs"):
+        System([AutomatonSlave("two", Ears(heard=[0.0, 0.0]))], {"two.heard": []})
